@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "scene/reconstruction.h"
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace vgtw {
+
+struct ColoredPoint {
+  Eigen::Vector3f xyz = Eigen::Vector3f::Zero();
+  std::array<uint8_t, 3> rgb = {0, 0, 0};
+};
+
+std::vector<ColoredPoint> PointsOf(const Reconstruction& reconstruction);
+
+// Binary little-endian PLY (float x y z, uchar red green blue).
+void WritePly(const std::filesystem::path& path, const std::vector<ColoredPoint>& points);
+// Reads ASCII and binary little-endian PLY with at least x y z; other properties are skipped.
+std::vector<ColoredPoint> ReadPly(const std::filesystem::path& path);
+// Binary PCD 0.7 (x y z rgb), as PCL reads it.
+void WritePcd(const std::filesystem::path& path, const std::vector<ColoredPoint>& points);
+
+}  // namespace vgtw

@@ -1,0 +1,26 @@
+# Helpers that keep every folder's CMakeLists.txt to its list of files and links.
+
+function(vgtw_compile_options target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra $<$<BOOL:${VGTW_WERROR}>:-Werror>)
+  if(VGTW_SANITIZE)
+    target_compile_options(${target} PRIVATE -fsanitize=${VGTW_SANITIZE} -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC -fsanitize=${VGTW_SANITIZE})
+  endif()
+endfunction()
+
+# vgtw_add_library(scene HEADERS a.h ... SOURCES a.cc ... [PUBLIC lib ...] [PRIVATE lib ...])
+# makes vgtw::scene. HEADERS are the folder's doors: they are installed and must stand alone.
+function(vgtw_add_library name)
+  cmake_parse_arguments(ARG "" "" "HEADERS;SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  set(target vgtw_${name})
+  add_library(${target} STATIC ${ARG_SOURCES})
+  add_library(vgtw::${name} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON)
+  target_sources(${target} PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES
+                                  ${ARG_HEADERS})
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  vgtw_compile_options(${target})
+  install(TARGETS ${target} EXPORT vgtw FILE_SET HEADERS
+          DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vgtw)
+endfunction()

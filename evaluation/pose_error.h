@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "scene/rigid3d.h"
+#include "scene/sim3d.h"
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace vgtw {
+
+struct ViewPoseError {
+  std::string name;
+  double rotation_deg = 0.0;
+  double centre = 0.0;  // scene units of the reference
+};
+
+// Poses of an estimate against a reference, Sim3-aligned on the camera centres (Umeyama over all
+// common views). Law: a similarity applied to the whole estimate changes nothing.
+struct PoseComparison {
+  std::vector<ViewPoseError> views;  // common to both, sorted by name
+  size_t num_missing = 0;            // in the reference only
+  Sim3d reference_from_estimate;
+  double extent = 0.0;               // diameter of the reference's centres, scene units
+  double centre_rmse = 0.0;          // "ATE", scene units of the reference
+  double centre_rmse_percent = 0.0;  // of the extent
+  double rotation_mean_deg = 0.0;    // after alignment
+  double rotation_median_deg = 0.0;
+  // Alignment-free: over all pairs of common views.
+  double relative_rotation_median_deg = 0.0;
+  double relative_direction_median_deg = 0.0;  // angle between relative translations
+};
+
+// Returns nullopt with fewer than 3 common views or collinear centres, where the alignment is
+// undetermined.
+std::optional<PoseComparison> ComparePoses(const std::map<std::string, Rigid3d>& estimate,
+                                           const std::map<std::string, Rigid3d>& reference);
+
+}  // namespace vgtw

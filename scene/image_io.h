@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "scene/distractor_mask.h"
+#include "scene/grid.h"
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace vgtw {
+
+using Rgb = std::array<uint8_t, 3>;
+using RgbImage = Grid<Rgb>;
+using GrayImage = Grid<uint8_t>;
+
+struct ImageSize {
+  uint64_t width = 0;
+  uint64_t height = 0;
+  bool operator==(const ImageSize&) const = default;
+};
+
+// Pixels exactly as COLMAP sees the file: stored orientation (EXIF orientation NOT applied), 8 bit.
+// Alpha is dropped. Throws Error if the file is missing, not an image, truncated, or has more than
+// 2^30 pixels.
+RgbImage ReadRgbImage(const std::filesystem::path& path);
+
+// Size from the file's header only where the format allows (JPEG, PNG), else by decoding.
+ImageSize ReadImageSize(const std::filesystem::path& path);
+
+// A mask file as COLMAP reads it: any non-zero gray value is kept (255). Throws Error as above, and
+// for 16-bit files, which COLMAP 3.8 refuses.
+StaticMask ReadStaticMask(const std::filesystem::path& path);
+
+// 8-bit PNG (or JPEG by extension), written atomically; parent folders are created.
+void WriteImage(const std::filesystem::path& path, const RgbImage& image);
+void WriteImage(const std::filesystem::path& path, const GrayImage& image);
+
+// Focal length in pixels by COLMAP's default rule, from a JPEG's EXIF: 35-mm equivalent / 35 *
+// max(width, height); else FocalLength with the focal plane's resolution; nullopt where neither is
+// given (COLMAP then looks into its sensor table, which is not part of this project, and falls back
+// to 1.2 * max(width, height)). Never throws for damaged EXIF.
+std::optional<double> ReadExifFocalLength(const std::filesystem::path& path, const ImageSize& size);
+
+// Names of the images below `folder`, recursively, relative with '/', sorted byte-wise; extensions
+// that COLMAP reads (jpg jpeg png tif tiff bmp ppm pgm, any case). Hidden files are left out.
+// Throws Error if the folder is missing or holds no image.
+std::vector<std::string> ListImages(const std::filesystem::path& folder);
+
+}  // namespace vgtw
