@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/image_header.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <string_view>
+
+#include <libexif/exif-data.h>
+
+namespace vgtw {
+namespace {
+
+using Bytes = std::span<const std::byte>;
+
+uint32_t BigEndian(Bytes bytes, size_t offset, size_t num_bytes) {
+  uint32_t value = 0;
+  for (size_t i = 0; i < num_bytes; ++i) {
+    value = value << 8 | std::to_integer<uint32_t>(bytes[offset + i]);
+  }
+  return value;
+}
+
+bool StartsWith(Bytes bytes, std::string_view prefix) {
+  return bytes.size() >= prefix.size() &&
+         std::memcmp(bytes.data(), prefix.data(), prefix.size()) == 0;
+}
+
+constexpr std::string_view kJpegSignature = "\xff\xd8\xff";
+constexpr std::string_view kPngSignature = "\x89PNG\r\n\x1a\n";
+constexpr std::string_view kExifSignature{"Exif\0\0", 6};
+
+constexpr uint8_t kEndOfImage = 0xd9;
+constexpr uint8_t kApp1 = 0xe1;
+
+struct JpegSegment {
+  uint8_t marker = 0;
+  Bytes payload;  // without the length; empty for EOI
+};
+
+// Walks the segments of a JPEG. Entropy-coded data between them is stepped over, since a marker
+// cannot occur inside it.
+class JpegWalker {
+ public:
+  explicit JpegWalker(Bytes file) : rest_(file.subspan(kJpegSignature.size() - 1)) {}
+
+  std::optional<JpegSegment> Next() {
+    while (rest_.size() >= 2) {
+      const auto found = std::find(rest_.begin(), rest_.end() - 1, std::byte{0xff});
+      rest_ = rest_.subspan(static_cast<size_t>(found - rest_.begin()));
+      if (rest_.size() < 2) break;
+      const auto marker = std::to_integer<uint8_t>(rest_[1]);
+      if (marker == 0xff) {
+        rest_ = rest_.subspan(1);
+        continue;
+      }
+      rest_ = rest_.subspan(2);
+      if (marker == kEndOfImage) return JpegSegment{marker, {}};
+      if (!HasPayload(marker)) continue;
+      if (rest_.size() < 2) break;
+      const size_t length = BigEndian(rest_, 0, 2);  // counts its own two bytes
+      if (length < 2 || length > rest_.size()) break;
+      const JpegSegment segment{marker, rest_.subspan(2, length - 2)};
+      rest_ = rest_.subspan(length);
+      return segment;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  // 00 is a stuffed byte, 01 TEM, d0..d7 restarts, d8 SOI.
+  static bool HasPayload(uint8_t marker) {
+    return marker > 0x01 && !(marker >= 0xd0 && marker <= 0xd8);
+  }
+
+  Bytes rest_;
+};
+
+bool IsFrameHeader(uint8_t marker) {
+  return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
+}
+
+std::optional<ImageSize> NonZero(uint64_t width, uint64_t height) {
+  if (width == 0 || height == 0) return std::nullopt;
+  return ImageSize{width, height};
+}
+
+std::optional<ImageSize> ParseJpegSize(Bytes file) {
+  JpegWalker walker(file);
+  while (const auto segment = walker.Next()) {
+    if (segment->marker == kEndOfImage) break;
+    if (!IsFrameHeader(segment->marker)) continue;
+    if (segment->payload.size() < 5) break;
+    return NonZero(BigEndian(segment->payload, 3, 2), BigEndian(segment->payload, 1, 2));
+  }
+  return std::nullopt;
+}
+
+std::optional<ImageSize> ParsePngSize(Bytes file) {
+  const Bytes chunk = file.subspan(kPngSignature.size());
+  if (chunk.size() < 16 || !StartsWith(chunk.subspan(4), "IHDR")) return std::nullopt;
+  return NonZero(BigEndian(chunk, 8, 4), BigEndian(chunk, 12, 4));
+}
+
+bool JpegHasEnd(Bytes file) {
+  JpegWalker walker(file);
+  while (const auto segment = walker.Next()) {
+    if (segment->marker == kEndOfImage) return true;
+  }
+  return false;
+}
+
+bool PngHasEnd(Bytes file) {
+  constexpr size_t kChunkFrame = 12;  // length, type, CRC
+  Bytes rest = file.subspan(kPngSignature.size());
+  while (rest.size() >= kChunkFrame) {
+    const size_t length = BigEndian(rest, 0, 4);
+    if (length > rest.size() - kChunkFrame) return false;
+    if (StartsWith(rest.subspan(4), "IEND")) return true;
+    rest = rest.subspan(length + kChunkFrame);
+  }
+  return false;
+}
+
+// A number of the Exif IFD, nullopt if absent or of another kind.
+std::optional<double> ReadTag(ExifData* exif, ExifTag tag) {
+  const ExifEntry* entry = exif_content_get_entry(exif->ifd[EXIF_IFD_EXIF], tag);
+  if (entry == nullptr || entry->data == nullptr || entry->components < 1 ||
+      entry->size < exif_format_get_size(entry->format)) {
+    return std::nullopt;
+  }
+  const ExifByteOrder order = exif_data_get_byte_order(exif);
+  if (entry->format == EXIF_FORMAT_SHORT) return exif_get_short(entry->data, order);
+  if (entry->format == EXIF_FORMAT_LONG) return exif_get_long(entry->data, order);
+  if (entry->format == EXIF_FORMAT_RATIONAL) {
+    const ExifRational rational = exif_get_rational(entry->data, order);
+    if (rational.denominator == 0) return std::nullopt;
+    return static_cast<double>(rational.numerator) / rational.denominator;
+  }
+  return std::nullopt;
+}
+
+// Millimetres of EXIF's FocalPlaneResolutionUnit.
+std::optional<double> ResolutionUnitMm(int unit) {
+  switch (unit) {
+    case 2:
+      return 25.4;
+    case 3:
+      return 10.0;
+    case 4:
+      return 1.0;
+    case 5:
+      return 0.001;
+    default:
+      return std::nullopt;
+  }
+}
+
+// The sensor's width follows from PixelXDimension, not from the file's width, because the photo may
+// have been resized with its EXIF kept.
+std::optional<double> SensorWidthMm(ExifData* exif) {
+  const auto pixels = ReadTag(exif, EXIF_TAG_PIXEL_X_DIMENSION);
+  const auto resolution = ReadTag(exif, EXIF_TAG_FOCAL_PLANE_X_RESOLUTION);
+  const auto unit = ReadTag(exif, EXIF_TAG_FOCAL_PLANE_RESOLUTION_UNIT);
+  if (!pixels || !resolution || !unit || *resolution <= 0.0 || *unit > 5.0) return std::nullopt;
+  const auto unit_mm = ResolutionUnitMm(static_cast<int>(*unit));
+  if (!unit_mm) return std::nullopt;
+  return *pixels / *resolution * *unit_mm;
+}
+
+std::optional<double> FocalLengthPx(ExifData* exif, double longer_side) {
+  constexpr double kFilmWidthMm = 35.0;  // COLMAP divides by 35, not by the 36 of the film
+  const auto film_mm = ReadTag(exif, EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
+  if (film_mm && *film_mm > 0.0) return *film_mm / kFilmWidthMm * longer_side;
+  const auto focal_mm = ReadTag(exif, EXIF_TAG_FOCAL_LENGTH);
+  const auto sensor_mm = SensorWidthMm(exif);
+  if (!focal_mm || *focal_mm <= 0.0 || !sensor_mm || *sensor_mm <= 0.0) return std::nullopt;
+  return *focal_mm / *sensor_mm * longer_side;
+}
+
+}  // namespace
+
+std::optional<ImageSize> ParseImageSize(Bytes file) {
+  if (StartsWith(file, kJpegSignature)) return ParseJpegSize(file);
+  if (StartsWith(file, kPngSignature)) return ParsePngSize(file);
+  return std::nullopt;
+}
+
+bool IsTruncated(Bytes file) {
+  if (StartsWith(file, kJpegSignature)) return !JpegHasEnd(file);
+  if (StartsWith(file, kPngSignature)) return !PngHasEnd(file);
+  return false;
+}
+
+Bytes FindExif(Bytes file) {
+  if (!StartsWith(file, kJpegSignature)) return {};
+  constexpr uint8_t kStartOfScan = 0xda;
+  JpegWalker walker(file);
+  while (const auto segment = walker.Next()) {
+    if (segment->marker == kStartOfScan || segment->marker == kEndOfImage) break;
+    if (segment->marker == kApp1 && StartsWith(segment->payload, kExifSignature)) {
+      return segment->payload;
+    }
+  }
+  return {};
+}
+
+std::optional<double> ParseExifFocalLength(Bytes exif, const ImageSize& size) {
+  if (exif.empty()) return std::nullopt;
+  const std::unique_ptr<ExifData, decltype(&exif_data_unref)> data(exif_data_new(),
+                                                                   &exif_data_unref);
+  if (!data) return std::nullopt;
+  // Otherwise libexif invents the tags that the standard demands.
+  exif_data_unset_option(data.get(), EXIF_DATA_OPTION_FOLLOW_SPECIFICATION);
+  exif_data_load_data(data.get(),
+                      reinterpret_cast<const unsigned char*>(exif.data()),
+                      static_cast<unsigned int>(exif.size()));
+  const auto longer_side = static_cast<double>(std::max(size.width, size.height));
+  return FocalLengthPx(data.get(), longer_side);
+}
+
+}  // namespace vgtw

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "scene/image_io.h"
+
+#include <cstddef>
+#include <optional>
+#include <span>
+
+namespace vgtw {
+
+// What the bytes of an image file say before any pixel is decoded. The bytes are foreign: every
+// function is defined for any input, including an empty one.
+
+// Size of a JPEG (first frame header) or PNG (IHDR); nullopt for other or damaged files.
+std::optional<ImageSize> ParseImageSize(std::span<const std::byte> file);
+
+// Whether a JPEG or PNG ends before its end marker (EOI, IEND). Decoders fill the rest of such a
+// JPEG with grey without a word. False for other formats. Bytes behind the end marker are allowed,
+// because phones append thumbnails and videos there.
+bool IsTruncated(std::span<const std::byte> file);
+
+// The APP1 payload of a JPEG that starts with "Exif\0\0", or an empty span.
+std::span<const std::byte> FindExif(std::span<const std::byte> file);
+
+// Focal length in pixels by the rule of ReadExifFocalLength, from such a payload.
+std::optional<double> ParseExifFocalLength(std::span<const std::byte> exif, const ImageSize& size);
+
+}  // namespace vgtw

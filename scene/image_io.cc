@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/image_io.h"
+
+#include "scene/error.h"
+#include "scene/files.h"
+#include "scene/image_header.h"
+
+#include <algorithm>
+#include <limits>
+#include <set>
+#include <string_view>
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace vgtw {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Blue, green, red of the stored pixels. `extra_flags` as in cv::imread.
+cv::Mat Decode(const fs::path& path, std::span<const std::byte> bytes, int extra_flags = 0) {
+  constexpr std::string_view kExpected =
+      "a JPEG, PNG, TIFF, BMP or PPM image of at most 2^30 pixels";
+  if (bytes.empty()) Fail(path, "is empty", kExpected);
+  if (IsTruncated(bytes)) {
+    Fail(path, "is truncated (its end marker is missing)", "a complete file", "copy it again");
+  }
+  if (bytes.size() > static_cast<size_t>(std::numeric_limits<int>::max())) {
+    Fail(path, "has more than 2 GiB", kExpected);
+  }
+  const cv::Mat buffer(1,
+                       static_cast<int>(bytes.size()),
+                       CV_8UC1,
+                       const_cast<std::byte*>(bytes.data()));  // only read by imdecode
+  cv::Mat pixels;
+  try {
+    pixels = cv::imdecode(buffer, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION | extra_flags);
+  } catch (const cv::Exception&) {
+    pixels.release();
+  }
+  if (pixels.empty()) Fail(path, "cannot be decoded", kExpected);
+  return pixels;
+}
+
+std::string LowerExtension(const fs::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return extension;
+}
+
+void Encode(const fs::path& path, const cv::Mat& pixels) {
+  const std::string extension = LowerExtension(path);
+  if (extension != ".png" && extension != ".jpg" && extension != ".jpeg") {
+    Fail(path,
+         "has the extension '" + Printable(extension) + "'",
+         "an image to write as .png, .jpg or .jpeg");
+  }
+  std::vector<uchar> bytes;
+  if (pixels.empty() || !cv::imencode(extension, pixels, bytes)) {
+    Fail(path, "cannot be encoded", "an image of 1 to 65535 pixels a side");
+  }
+  std::error_code code;
+  if (path.has_parent_path()) fs::create_directories(path.parent_path(), code);
+  if (code) throw Error(Printable(path.string()) + ": cannot be written: " + code.message());
+  AtomicFile file(path);
+  file.Write(std::as_bytes(std::span(bytes)));
+  file.Commit();
+}
+
+bool IsHidden(const fs::path& path) { return path.filename().string().starts_with("."); }
+
+bool IsImageName(const fs::path& path) {
+  static const std::set<std::string, std::less<>> kExtensions = {
+      ".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp", ".ppm", ".pgm"};
+  return kExtensions.contains(LowerExtension(path));
+}
+
+}  // namespace
+
+RgbImage ReadRgbImage(const fs::path& path) {
+  const MappedFile file(path);
+  const cv::Mat bgr = Decode(path, file.bytes());
+  RgbImage image(bgr.cols, bgr.rows);
+  cv::Mat rgb(bgr.rows, bgr.cols, CV_8UC3, image.data().data());
+  cv::cvtColor(bgr, rgb, cv::COLOR_BGR2RGB);
+  return image;
+}
+
+ImageSize ReadImageSize(const fs::path& path) {
+  const MappedFile file(path);
+  if (const auto size = ParseImageSize(file.bytes())) return *size;
+  const cv::Mat pixels = Decode(path, file.bytes());
+  return {static_cast<uint64_t>(pixels.cols), static_cast<uint64_t>(pixels.rows)};
+}
+
+StaticMask ReadStaticMask(const fs::path& path) {
+  const MappedFile file(path);
+  const cv::Mat bgr = Decode(path, file.bytes(), cv::IMREAD_ANYDEPTH);
+  if (bgr.depth() != CV_8U) {
+    Fail(path, "has more than 8 bits per channel", "an 8-bit mask", "COLMAP 3.8 drops its image");
+  }
+  StaticMask static_mask(bgr.cols, bgr.rows);
+  for (int y = 0; y < bgr.rows; ++y) {
+    for (int x = 0; x < bgr.cols; ++x) {
+      const auto& pixel = bgr.at<cv::Vec3b>(y, x);
+      // COLMAP's library turns colour into luma of Rec. 709 and rounds it.
+      const double luma = 0.0722 * pixel[0] + 0.7152 * pixel[1] + 0.2126 * pixel[2];
+      static_mask(x, y) = luma >= 0.5 ? 255 : 0;
+    }
+  }
+  return static_mask;
+}
+
+void WriteImage(const fs::path& path, const RgbImage& image) {
+  const cv::Mat rgb(image.height(), image.width(), CV_8UC3, const_cast<Rgb*>(image.data().data()));
+  cv::Mat bgr;
+  if (!image.empty()) cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
+  Encode(path, bgr);
+}
+
+void WriteImage(const fs::path& path, const GrayImage& image) {
+  Encode(
+      path,
+      cv::Mat(image.height(), image.width(), CV_8UC1, const_cast<uint8_t*>(image.data().data())));
+}
+
+std::optional<double> ReadExifFocalLength(const fs::path& path, const ImageSize& size) {
+  const MappedFile file(path);
+  return ParseExifFocalLength(FindExif(file.bytes()), size);
+}
+
+std::vector<std::string> ListImages(const fs::path& folder) {
+  if (!fs::is_directory(folder)) Fail(folder, "is not a folder", "a folder of images");
+  std::vector<std::string> names;
+  for (auto it = fs::recursive_directory_iterator(folder); it != fs::recursive_directory_iterator();
+       ++it) {
+    if (IsHidden(it->path())) {
+      it.disable_recursion_pending();
+      continue;
+    }
+    if (!it->is_regular_file() || !IsImageName(it->path())) continue;
+    std::string name = it->path().lexically_relative(folder).generic_string();
+    if (!IsSafeRelativeName(name)) {
+      Fail(
+          folder / name, "has a name with control characters or '\\'", "a plain name", "rename it");
+    }
+    names.push_back(std::move(name));
+  }
+  if (names.empty()) {
+    Fail(folder, "holds no image", "jpg, jpeg, png, tif, tiff, bmp, ppm or pgm files");
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+}  // namespace vgtw
