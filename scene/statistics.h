@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+namespace vgtw {
+
+// Value below which `percent` of the values lie, linear between neighbours in sorted order (0 gives
+// the smallest, 100 the largest). Throws std::invalid_argument if `values` is empty or `percent` is
+// outside [0, 100].
+double Percentile(std::vector<double> values, double percent);
+
+// The middle value, or the mean of the two middle values.
+double Median(std::vector<double> values);
+
+}  // namespace vgtw
