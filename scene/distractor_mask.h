@@ -24,13 +24,16 @@ struct StaticMaskOptions {
   // Grows (positive) the excluded area by a disc of this radius, in original pixels. SIFT looks
   // around a keypoint, so a margin keeps distractor texture out of descriptors. >= 0.
   int dilate_px = 7;
-  // Shrinks the excluded area by a disc of this radius before it is grown (removes specks). >= 0.
+  // Shrinks the excluded area by a disc of this radius before it is grown (removes specks), but not
+  // from the image border or the unknown area. >= 0.
   int erode_px = 0;
   // Excluded areas (8-connected) smaller than this many original pixels are kept. >= 0.
   int min_area_px = 0;
-  // Static holes (4-connected) inside an excluded area smaller than this many pixels are excluded.
+  // Static holes (4-connected) inside an excluded area smaller than this many pixels are excluded;
+  // a gap that touches the image border is no hole. >= 0.
   int fill_holes_px = 0;
-  // What becomes of pixels that the network never saw (crop, unknown probability).
+  // What becomes of pixels that the network never saw (crop, unknown probability). kKeep keeps them
+  // unless a distractor beside them is dilated into them.
   UnknownPolicy unknown = UnknownPolicy::kKeep;
 
   void Check() const;
