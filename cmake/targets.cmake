@@ -3,13 +3,15 @@
 function(vgtw_compile_options target)
   target_compile_options(${target} PRIVATE -Wall -Wextra $<$<BOOL:${VGTW_WERROR}>:-Werror>)
   if(VGTW_SANITIZE)
-    target_compile_options(${target} PRIVATE -fsanitize=${VGTW_SANITIZE} -fno-omit-frame-pointer)
+    target_compile_options(${target} PRIVATE -fsanitize=${VGTW_SANITIZE} -fno-sanitize-recover=all
+                                             -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=${VGTW_SANITIZE})
   endif()
 endfunction()
 
 # vgtw_add_library(scene HEADERS a.h ... SOURCES a.cc ... [PUBLIC lib ...] [PRIVATE lib ...])
-# makes vgtw::scene. HEADERS are the folder's doors: they are installed and must stand alone.
+# makes vgtw::scene, which is also the component `scene` of the installed package.
+# HEADERS are the folder's doors: they are installed, must stand alone and include nothing heavy.
 function(vgtw_add_library name)
   cmake_parse_arguments(ARG "" "" "HEADERS;SOURCES;PUBLIC;PRIVATE" ${ARGN})
   set(target vgtw_${name})
@@ -21,6 +23,9 @@ function(vgtw_add_library name)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   vgtw_compile_options(${target})
-  install(TARGETS ${target} EXPORT vgtw FILE_SET HEADERS
-          DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vgtw)
+  set_property(GLOBAL APPEND PROPERTY VGTW_COMPONENTS ${name})
+  install(TARGETS ${target} EXPORT vgtw_${name}
+          FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vgtw)
+  install(EXPORT vgtw_${name} NAMESPACE vgtw:: FILE vgtw_${name}.cmake
+          DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/vgtw)
 endfunction()
