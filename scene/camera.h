@@ -74,10 +74,10 @@ std::optional<Eigen::Vector2d> Project(const Camera& camera, const Eigen::Vector
 // invertible around the pixel; nullopt where the iteration does not converge.
 std::optional<Eigen::Vector2d> Unproject(const Camera& camera, const Eigen::Vector2d& pixel);
 
-// Intrinsics after the image is resized to width x height (also anisotropically: then a model with
-// one focal length is promoted where needed: SIMPLE_PINHOLE to PINHOLE, SIMPLE_RADIAL and RADIAL to
-// OPENCV; others keep the mean focal length only if the anisotropy is below 1e-3, else
-// std::invalid_argument).
+// Intrinsics after the image is resized to width x height. Law: where a point projects to (x, y)
+// before, it projects to (x, y) * new size / old size after. Where that needs two focal lengths, a
+// model with one becomes the model that holds it as a special case: SIMPLE_PINHOLE becomes PINHOLE,
+// SIMPLE_RADIAL and RADIAL become OPENCV, their fisheyes OPENCV_FISHEYE.
 Camera Rescale(const Camera& camera, uint64_t width, uint64_t height);
 
 }  // namespace vgtw

@@ -25,6 +25,16 @@ Rigid3d Inverse(const Rigid3d& b_from_a) {
   return {inverse, -(inverse * b_from_a.translation)};
 }
 
+std::string FindFault(const Rigid3d& b_from_a) {
+  // Quaternions from float32 files are off by up to 1e-7.
+  constexpr double kMaxNormError = 1e-6;
+  if (!b_from_a.translation.allFinite()) return "the translation is not finite";
+  if (!(std::abs(b_from_a.rotation.norm() - 1.0) <= kMaxNormError)) {
+    return "the rotation is not a unit quaternion";
+  }
+  return {};
+}
+
 Eigen::Vector3d OriginInSource(const Rigid3d& b_from_a) {
   return -(b_from_a.rotation.conjugate() * b_from_a.translation);
 }

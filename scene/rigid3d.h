@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <string>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
@@ -23,6 +25,9 @@ Rigid3d operator*(const Rigid3d& c_from_b, const Rigid3d& b_from_a);
 
 // a_from_b from b_from_a.
 Rigid3d Inverse(const Rigid3d& b_from_a);
+
+// Why the motion cannot be used (not finite, quaternion not of unit length to 1e-6), or "".
+std::string FindFault(const Rigid3d& b_from_a);
 
 // The origin of b seen in a; for cam_from_world this is the camera centre in the world.
 Eigen::Vector3d OriginInSource(const Rigid3d& b_from_a);
