@@ -28,8 +28,9 @@ class PredictionReader {
   const std::string& weights_hash() const { return weights_hash_; }
   const std::vector<View>& views() const { return views_; }  // sorted by name
 
-  // Throws Error if the file is truncated, a tensor has a wrong type or size, or a value is
-  // invalid.
+  // depth, depth_conf and points may be of any floating type, distractor_prob also U8 (255 = 1).
+  // Throws Error if the file is truncated, a tensor is unknown or has a wrong type or size, or a
+  // value is invalid (see FindFault).
   ViewPrediction Load(size_t view_idx) const;
 
  private:
@@ -41,7 +42,8 @@ class PredictionReader {
 };
 
 // Writes one: Add() each view in any order, from one thread, then Commit(). Throws
-// std::invalid_argument for a view with a fault or a name given twice. Maps are stored as depth
+// std::invalid_argument for a view with a fault or a name given twice, Error for a name that is not
+// UTF-8, a photo above 65536 pixels or a folder that cannot be written. Maps are stored as depth
 // f32, depth_conf f32, distractor_prob f16, points f32, depth_samples f32 [N,4].
 class PredictionWriter {
  public:
