@@ -13,6 +13,7 @@
 #include <limits>
 #include <numbers>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 namespace vgtw {
