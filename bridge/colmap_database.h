@@ -47,8 +47,11 @@ struct Descriptors {
 // (point2D_idx in image 1, point2D_idx in image 2); image 1 is the one that was named first.
 using FeatureMatches = std::vector<std::array<uint32_t, 2>>;
 
+// How image 2 relates to image 1:  x2^T F x1 = 0,  x2 ~ H x1  (pixels), E likewise for rays.
 // config: 0 undefined, 1 degenerate, 2 calibrated, 3 uncalibrated, 4 planar, 5 panoramic,
 // 6 planar or panoramic, 7 watermark, 8 multiple, 9 calibrated rig (>= 3.12).
+// What is not set is stored as that version does: NULL from 4.0 on, before it zero matrices and an
+// identity pose, which therefore also read as not set, as do non-finite values.
 struct TwoViewGeometry {
   int config = 0;
   FeatureMatches inlier_matches;
@@ -108,8 +111,10 @@ class ColmapDatabase {
   // Empty if there is no row. Columns follow the order of the arguments.
   FeatureMatches ReadMatches(ImageId image_id1, ImageId image_id2) const;
   std::optional<TwoViewGeometry> ReadTwoViewGeometry(ImageId image_id1, ImageId image_id2) const;
+  // Every pair that has a row, also an empty one; sorted, the smaller id first.
   std::vector<std::pair<ImageId, ImageId>> ReadMatchPairs() const;
   std::vector<std::pair<ImageId, ImageId>> ReadTwoViewPairs() const;
+  // Sorted by image id; rows of COLMAP >= 4 without a position (gravity only) are left out.
   std::vector<PosePrior> ReadPosePriors() const;
   std::vector<Rig> ReadRigs() const;
   std::vector<Frame> ReadFrames() const;  // without poses
@@ -125,16 +130,20 @@ class ColmapDatabase {
     ColmapDatabase* database_;
   };
 
-  void WriteCamera(const Camera& camera);  // insert or replace, by id
+  // Insert or replace, by id.
+  void WriteCamera(const Camera& camera);
   void WriteImage(const DatabaseImage& image);
   void WriteKeypoints(ImageId image_id, const Keypoints& keypoints);
   void WriteDescriptors(ImageId image_id, const Descriptors& descriptors);
   void WriteMatches(ImageId image_id1, ImageId image_id2, const FeatureMatches& matches);
   void WriteTwoViewGeometry(ImageId image_id1, ImageId image_id2, const TwoViewGeometry& geometry);
+  void ClearMatches();  // all rows of matches and two-view geometries
+  // The covariance is left out where 3.10 has no column for it. Throws Error without the table.
   void WritePosePrior(const PosePrior& prior);
   // Replaces rigs and frames by the trivial ones: one rig per camera (rig_id = camera_id), one
   // frame per image (frame_id = image_id). No effect where the schema has no rigs.
   void WriteTrivialRigsAndFrames();
+  // These throw Error where the schema has no rigs.
   void WriteRig(const Rig& rig);
   void WriteFrame(const Frame& frame);
 

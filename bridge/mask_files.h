@@ -3,6 +3,7 @@
 
 #include "bridge/predictions.h"
 #include "scene/distractor_mask.h"
+#include "scene/image_io.h"
 #include "scene/progress.h"
 
 #include <filesystem>
@@ -15,9 +16,14 @@ namespace vgtw {
 std::filesystem::path MaskPath(const std::filesystem::path& mask_folder,
                                const std::string& image_name);
 
+// A mask file as COLMAP reads it. Throws Error if it is unreadable or not of this size: COLMAP does
+// not resize masks, a smaller one silently excludes what lies beyond it.
+StaticMask ReadMaskOfSize(const std::filesystem::path& path, const ImageSize& size);
+
 struct MaskSummary {
   std::string image_name;
   double excluded_share = 0.0;  // of the image's pixels, in [0,1]
+  bool was_missing = false;     // there was nothing to make it from; it is all-white
 };
 
 // Writes one mask per view, also an all-white one where nothing is excluded or nothing was
@@ -29,5 +35,17 @@ std::vector<MaskSummary> WriteMasks(const PredictionReader& predictions,
                                     bool overwrite,
                                     int num_threads = 0,
                                     const ProgressCallback& progress = {});
+
+// Turns masks that were made elsewhere, named by MaskPath below `from_folder`, into a folder that
+// every version of COLMAP reads: 8-bit, 0 or 255, one per name in `image_names` (all-white where
+// `from_folder` has none). The folder appears complete or not at all. Throws Error if a mask is
+// unreadable or not of its photo's size below `image_folder`.
+std::vector<MaskSummary> CopyMasks(const std::filesystem::path& from_folder,
+                                   const std::filesystem::path& image_folder,
+                                   const std::vector<std::string>& image_names,
+                                   const std::filesystem::path& mask_folder,
+                                   bool overwrite,
+                                   int num_threads = 0,
+                                   const ProgressCallback& progress = {});
 
 }  // namespace vgtw

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bridge/mask_files.h"
+
+#include "scene/error.h"
+#include "scene/files.h"
+#include "scene/image_io.h"
+#include "scene/parallel.h"
+
+#include <functional>
+
+namespace vgtw {
+namespace {
+
+using MaskMaker = std::function<MaskSummary(size_t idx, StaticMask& static_mask)>;
+
+// Writes `num_masks` masks in parallel; `make` fills one and says whose it is.
+std::vector<MaskSummary> WriteMaskFolder(const std::filesystem::path& mask_folder,
+                                         bool overwrite,
+                                         size_t num_masks,
+                                         int num_threads,
+                                         const ProgressCallback& progress,
+                                         const MaskMaker& make) {
+  AtomicFolder folder(mask_folder, overwrite);
+  std::vector<MaskSummary> summaries(num_masks);
+  const auto write_mask = [&](int64_t i) {
+    MaskSummary& summary = summaries[static_cast<size_t>(i)];
+    StaticMask static_mask;
+    summary = make(static_cast<size_t>(i), static_mask);
+    summary.excluded_share = ExcludedShare(static_mask);
+    WriteImage(MaskPath(folder.path(), summary.image_name), static_mask);
+  };
+  ParallelFor(static_cast<int64_t>(num_masks), num_threads, write_mask, progress);
+  folder.Commit();
+  return summaries;
+}
+
+StaticMask AllWhite(uint64_t width, uint64_t height) {
+  return {static_cast<int>(width), static_cast<int>(height), 255};
+}
+
+}  // namespace
+
+std::filesystem::path MaskPath(const std::filesystem::path& mask_folder,
+                               const std::string& image_name) {
+  return mask_folder / (image_name + ".png");
+}
+
+StaticMask ReadMaskOfSize(const std::filesystem::path& path, const ImageSize& size) {
+  StaticMask static_mask = ReadStaticMask(path);
+  const auto text = [](uint64_t width, uint64_t height) {
+    return std::to_string(width) + " x " + std::to_string(height) + " pixels";
+  };
+  const auto width = static_cast<uint64_t>(static_mask.width());
+  const auto height = static_cast<uint64_t>(static_mask.height());
+  if (ImageSize{width, height} != size) {
+    Fail(path,
+         "has " + text(width, height),
+         text(size.width, size.height) + ", the size of its image",
+         "write masks at full size: COLMAP does not resize them");
+  }
+  return static_mask;
+}
+
+std::vector<MaskSummary> WriteMasks(const PredictionReader& predictions,
+                                    const std::filesystem::path& mask_folder,
+                                    const StaticMaskOptions& options,
+                                    bool overwrite,
+                                    int num_threads,
+                                    const ProgressCallback& progress) {
+  options.Check();
+  const auto make = [&](size_t view_idx, StaticMask& static_mask) {
+    const ViewPrediction prediction = predictions.Load(view_idx);
+    const View& view = prediction.view;
+    const bool was_missing = prediction.distractor.empty();
+    static_mask = was_missing ? AllWhite(view.camera.width, view.camera.height)
+                              : MakeStaticMask(view, prediction.distractor, options);
+    return MaskSummary{.image_name = view.name, .was_missing = was_missing};
+  };
+  return WriteMaskFolder(
+      mask_folder, overwrite, predictions.views().size(), num_threads, progress, make);
+}
+
+std::vector<MaskSummary> CopyMasks(const std::filesystem::path& from_folder,
+                                   const std::filesystem::path& image_folder,
+                                   const std::vector<std::string>& image_names,
+                                   const std::filesystem::path& mask_folder,
+                                   bool overwrite,
+                                   int num_threads,
+                                   const ProgressCallback& progress) {
+  if (!std::filesystem::is_directory(from_folder)) {
+    Fail(from_folder, "is not a folder", "masks named <image name>.png");
+  }
+  const auto make = [&](size_t idx, StaticMask& static_mask) {
+    const std::string& name = image_names[idx];
+    VGTW_CHECK(IsSafeRelativeName(name), "image name '" + Printable(name) + "'");
+    const ImageSize size = ReadImageSize(image_folder / name);
+    const std::filesystem::path path = MaskPath(from_folder, name);
+    const bool was_missing = !std::filesystem::exists(path);
+    static_mask = was_missing ? AllWhite(size.width, size.height) : ReadMaskOfSize(path, size);
+    return MaskSummary{.image_name = name, .was_missing = was_missing};
+  };
+  return WriteMaskFolder(mask_folder, overwrite, image_names.size(), num_threads, progress, make);
+}
+
+}  // namespace vgtw
