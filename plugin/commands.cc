@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/commands.h"
+
+#include "plugin/progress.h"
+#include "scene/files.h"
+
+#include <cstdio>
+
+namespace vgtw {
+
+const std::vector<Command>& Commands() {
+  static const std::vector<Command> commands = {
+      {"doctor", "What is here, what works, what to install", DeclareDoctor},
+      {"demo",
+       "Make photos with moving distractors and reconstruct them, with and without masks",
+       DeclareDemo,
+       "  vgtw demo --output_path demo/"},
+      {"import",
+       "Other systems' poses and depths -> predictions folder",
+       DeclareImport,
+       "  vgtw import --input_path vggt/sparse --image_path photos/ --output_path predictions/\n"
+       "  vgtw import --input_path predictions.npz --image_path photos/ --output_path "
+       "predictions/"},
+      {"mask make",
+       "Predictions -> COLMAP masks",
+       DeclareMaskMake,
+       "  vgtw mask make --predictions_path predictions/ --output_path masks/ --dilate_px 10"},
+      {"mask apply",
+       "Take distractors out of an existing COLMAP database",
+       DeclareMaskApply,
+       "  vgtw mask apply --database_path a.db --mask_path masks/ --output_path b.db"},
+      {"seed",
+       "Predictions (and database) -> COLMAP model",
+       DeclareSeed,
+       "  vgtw seed --predictions_path predictions/ --image_path photos/ --output_path sparse/\n"
+       "  vgtw seed --predictions_path predictions/ --database_path a.db --output_path seed/"},
+      {"run",
+       "Photos and predictions -> masks, database, refined COLMAP model, report",
+       DeclareRun,
+       "  vgtw run --image_path photos/ --predictions_path predictions/ --output_path out/"},
+  };
+  return commands;
+}
+
+void AddUsability(Flags& flags, Usability& usability) {
+  flags.Group("Usability")
+      .Add("threads", &usability.num_threads, "Threads to use; 0 = all cores")
+      .AddChoice("progress",
+                 &usability.progress,
+                 {"auto", "bar", "plain", "json", "none"},
+                 "How progress is shown on stderr; auto = bar on a terminal")
+      .Add("json", &usability.json_path, "Also write the result to this file as JSON");
+}
+
+void Apply(const Usability& usability) { SetProgressStyle(usability.progress); }
+
+void Finish(const Usability& usability, const std::string& text, const nlohmann::json& result) {
+  std::fputs(text.c_str(), stdout);
+  if (!usability.json_path.empty()) {
+    WriteFileAtomically(usability.json_path, result.dump(2) + "\n");
+  }
+}
+
+}  // namespace vgtw

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/flags.h"
+
+#include "plugin/version.h"
+#include "scene/error.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <new>
+#include <numeric>
+
+#include <CLI/CLI.hpp>
+
+namespace vgtw {
+
+struct Flags::Impl {
+  CLI::App* app = nullptr;
+  std::string group = "Options";
+};
+
+namespace {
+
+constexpr int kExitFailed = 1;
+constexpr int kExitUsage = 2;
+
+template <typename T>
+void AddOption(Flags::Impl& impl, std::string_view name, T* value, std::string_view help) {
+  impl.app->add_option("--" + std::string(name), *value, std::string(help))
+      ->group(impl.group)
+      ->capture_default_str()
+      ->take_last();
+}
+
+size_t EditDistance(std::string_view a, std::string_view b) {
+  std::vector<size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), size_t{0});
+  for (size_t i = 0; i < a.size(); ++i) {
+    size_t diagonal = row[0]++;
+    for (size_t j = 0; j < b.size(); ++j) {
+      const size_t substitution = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({row[j + 1] + 1, row[j] + 1, substitution});
+    }
+  }
+  return row.back();
+}
+
+// "; did you mean '--image_path'?" for a word that is close to one that exists.
+std::string Suggest(const std::string& word, const std::vector<std::string>& known) {
+  std::string best;
+  size_t best_distance = word.size() / 3 + 1;
+  for (const std::string& candidate : known) {
+    const size_t distance = EditDistance(word, candidate);
+    if (distance > best_distance) continue;
+    best_distance = distance;
+    best = candidate;
+  }
+  return best.empty() ? "" : "; did you mean '" + best + "'?";
+}
+
+// The sub-command that the command line has reached.
+const CLI::App* Innermost(const CLI::App* app) {
+  while (!app->get_subcommands().empty()) app = app->get_subcommands().front();
+  return app;
+}
+
+std::string FullName(const CLI::App* app) {
+  std::string name = app->get_name();
+  for (app = app->get_parent(); app != nullptr; app = app->get_parent()) {
+    name = app->get_name() + " " + name;
+  }
+  return name;
+}
+
+int ReportUsage(const CLI::App& program, const CLI::ParseError& error) {
+  const CLI::App* app = Innermost(&program);
+  std::string message = error.what();
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
+    std::vector<std::string> known;
+    for (const CLI::Option* option : app->get_options()) known.push_back(option->get_name());
+    for (const CLI::App* sub : app->get_subcommands([](const CLI::App*) { return true; })) {
+      known.push_back(sub->get_name());
+    }
+    const std::vector<std::string> extras = program.remaining(/*recurse=*/true);
+    const std::string word = extras.empty() ? "" : extras.front();
+    message = "unknown argument '" + Printable(word) + "'" + Suggest(word, known);
+  }
+  std::fprintf(stderr,
+               "%s: %s (see '%s --help')\n",
+               FullName(app).c_str(),
+               message.c_str(),
+               FullName(app).c_str());
+  return kExitUsage;
+}
+
+int Fail(const CLI::App& program, const std::string& message) {
+  std::fprintf(stderr, "%s: %s\n", FullName(Innermost(&program)).c_str(), message.c_str());
+  return kExitFailed;
+}
+
+class Program {
+ public:
+  explicit Program(const std::vector<Command>& commands)
+      : app_(
+            "Distractor-free structure-from-motion: feed-forward predictions in, a COLMAP\n"
+            "reconstruction of the static scene out.\n",
+            "vgtw") {
+    app_.set_version_flag("--version", std::string("vgtw ") + kVersion);
+    app_.footer(
+        "Start with 'vgtw doctor' (what is here) and 'vgtw demo' (all of it, on a made scene).");
+    app_.require_subcommand(1);
+    for (const Command& command : commands) Add(command);
+  }
+
+  int Run(int argc, char** argv) {
+    try {
+      app_.parse(argc, argv);
+    } catch (const CLI::CallForHelp&) {
+      std::fputs(Innermost(&app_)->help().c_str(), stdout);
+      return 0;
+    } catch (const CLI::CallForVersion& version) {
+      std::printf("%s\n", version.what());
+      return 0;
+    } catch (const CLI::ParseError& error) {
+      return ReportUsage(app_, error);
+    }
+    try {
+      works_.at(Innermost(&app_))();
+      return 0;
+    } catch (const Error& error) {
+      return Fail(app_, error.what());
+    } catch (const std::bad_alloc&) {
+      return Fail(app_, "out of memory; use fewer --threads or smaller images");
+    } catch (const std::invalid_argument& error) {
+      return Fail(app_, std::string("invalid option: ") + error.what());
+    } catch (const std::exception& error) {
+      return Fail(app_, std::string("internal error: ") + error.what());
+    }
+  }
+
+ private:
+  void Add(const Command& command) {
+    CLI::App* parent = &app_;
+    std::string name(command.name);
+    if (const size_t space = name.find(' '); space != std::string::npos) {
+      const std::string group = name.substr(0, space);
+      CLI::App*& group_app = groups_[group];
+      if (group_app == nullptr) {
+        group_app = app_.add_subcommand(group, "Tools for distractor masks");
+        group_app->require_subcommand(1);
+      }
+      parent = group_app;
+      name = name.substr(space + 1);
+    }
+    CLI::App* app = parent->add_subcommand(name, std::string(command.summary));
+    if (!command.examples.empty()) app->footer("Examples:\n" + std::string(command.examples));
+    impls_.push_back(std::make_unique<Flags::Impl>());
+    impls_.back()->app = app;
+    Flags flags(impls_.back().get());
+    works_[app] = command.declare(flags);
+  }
+
+  CLI::App app_;
+  std::map<std::string, CLI::App*> groups_;
+  std::vector<std::unique_ptr<Flags::Impl>> impls_;
+  std::map<const CLI::App*, std::function<void()>> works_;
+};
+
+}  // namespace
+
+Flags& Flags::Group(std::string name) {
+  impl_->group = std::move(name);
+  return *this;
+}
+
+Flags& Flags::Add(std::string_view name, std::string* value, std::string_view help) {
+  AddOption(*impl_, name, value, help);
+  return *this;
+}
+
+Flags& Flags::Add(std::string_view name, std::filesystem::path* value, std::string_view help) {
+  AddOption(*impl_, name, value, help);
+  return *this;
+}
+
+Flags& Flags::Add(std::string_view name, int* value, std::string_view help) {
+  AddOption(*impl_, name, value, help);
+  return *this;
+}
+
+Flags& Flags::Add(std::string_view name, uint64_t* value, std::string_view help) {
+  AddOption(*impl_, name, value, help);
+  return *this;
+}
+
+Flags& Flags::Add(std::string_view name, double* value, std::string_view help) {
+  AddOption(*impl_, name, value, help);
+  return *this;
+}
+
+Flags& Flags::Add(std::string_view name, bool* value, std::string_view help) {
+  // expected(0, 1) lets COLMAP users write "--overwrite 1" as well as "--overwrite".
+  impl_->app->add_option("--" + std::string(name), *value, std::string(help))
+      ->group(impl_->group)
+      ->capture_default_str()
+      ->expected(0, 1)
+      ->take_last()
+      ->default_str(*value ? "1" : "0");
+  return *this;
+}
+
+Flags& Flags::AddChoice(std::string_view name,
+                        std::string* value,
+                        std::vector<std::string> choices,
+                        std::string_view help) {
+  impl_->app->add_option("--" + std::string(name), *value, std::string(help))
+      ->group(impl_->group)
+      ->capture_default_str()
+      ->take_last()
+      ->check(CLI::IsMember(std::move(choices)));
+  return *this;
+}
+
+Flags& Flags::Require(std::string_view name, std::filesystem::path* value, std::string_view help) {
+  impl_->app->add_option("--" + std::string(name), *value, std::string(help))
+      ->group(impl_->group)
+      ->take_last()
+      ->required();
+  return *this;
+}
+
+int RunProgram(const std::vector<Command>& commands, int argc, char** argv) {
+  return Program(commands).Run(argc, argv);
+}
+
+}  // namespace vgtw

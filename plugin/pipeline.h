@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "bridge/seed.h"
+#include "evaluation/pose_error.h"
+#include "scene/distractor_mask.h"
+#include "scene/reprojection.h"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace vgtw {
+
+enum class Matcher { kExhaustive, kSequential };
+
+struct PipelineOptions {
+  std::filesystem::path image_path;
+  std::filesystem::path predictions_path;
+  std::filesystem::path mask_path;  // COLMAP masks from elsewhere; "" = from the predictions
+  std::filesystem::path output_path;
+  std::filesystem::path reference_path;  // COLMAP model or predictions with better poses; "" = none
+  std::filesystem::path colmap;          // executable; "" = on PATH
+
+  bool use_masks = true;
+  StaticMaskOptions mask;
+
+  Matcher matcher = Matcher::kExhaustive;
+  int sequential_overlap = 10;  // images before and after, kSequential
+  int max_num_features = 8192;  // per image
+  int max_image_size = 3200;    // pixels; larger images are reduced for extraction
+  bool use_gpu = false;         // for colmap's SIFT
+  bool shared_camera = false;
+  bool refine_extra_params = false;  // distortion, where the camera model has it
+  int num_refine_rounds = 3;
+  // A view with fewer triangulated observations than this keeps its feed-forward pose.
+  int min_num_observations = 15;
+
+  int num_threads = 0;
+  bool overwrite = false;
+  bool force = false;
+};
+
+// What became of one photo.
+struct ViewReport {
+  std::string name;
+  size_t num_keypoints = 0;
+  size_t num_excluded_keypoints = 0;  // that lie in excluded pixels; 0 if masking worked
+  double excluded_share = 0.0;
+  size_t num_observations = 0;       // in the refined model
+  double rotation_change_deg = 0.0;  // refined against feed-forward, Sim3-aligned
+  bool is_refined = false;           // else it kept its feed-forward pose
+};
+
+struct PipelineReport {
+  std::vector<ViewReport> views;
+  ReprojectionStats feedforward;  // triangulated with the feed-forward poses
+  ReprojectionStats refined;
+  std::optional<PoseComparison> feedforward_error;  // against the reference, if there is one
+  std::optional<PoseComparison> refined_error;
+  size_t num_matched_pairs = 0;
+  std::vector<std::string> notes;  // what the user should know
+};
+
+// Photos and predictions to a COLMAP reconstruction of the static scene:
+//   masks -> features -> matches (real colmap) -> feedforward: triangulated with the predicted
+//   poses (real colmap) -> refined: rounds of triangulation and robust bundle adjustment.
+// Stages that are up to date are skipped. Throws Error if a stage leaves nothing to go on with.
+PipelineReport RunPipeline(const PipelineOptions& options);
+
+// The report as text for stdout.
+std::string FormatReport(const PipelineReport& report);
+
+}  // namespace vgtw

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "plugin/colmap.h"
+#include "refine/bundle_adjustment.h"
+#include "scene/reconstruction.h"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace vgtw {
+
+struct TriangulationInput {
+  std::filesystem::path database_path;
+  std::filesystem::path image_path;
+  std::filesystem::path scratch;  // an existing folder for the models that go in and come out
+  std::filesystem::path log_path;
+  int num_threads = 0;
+};
+
+// Triangulates the database's verified matches by colmap's point_triangulator with the poses and
+// intrinsics of `seed`, which stay as they are. Observations that reproject worse than
+// `max_error_px` are left out. Returns nullopt if colmap triangulated nothing.
+std::optional<Reconstruction> Triangulate(const Colmap& colmap,
+                                          const TriangulationInput& input,
+                                          const Reconstruction& seed,
+                                          double max_error_px);
+
+struct RefineRoundsOptions {
+  int num_rounds = 3;  // >= 1
+  // Views with fewer observations are held at their pose.
+  int min_num_observations = 15;
+  bool refine_extra_params = false;
+  int num_threads = 0;
+};
+
+struct RefineRoundsResult {
+  Reconstruction feedforward;  // triangulated with the poses of the seed
+  Reconstruction refined;
+  std::vector<BundleAdjustmentSummary> rounds;
+  std::vector<std::string> held_views;  // in the last round
+};
+
+// Coarse to fine: triangulate with wide limits, adjust robustly at the scale of the error that was
+// measured, drop what does not fit, triangulate again with the better poses and tighter limits.
+// Returns nullopt if nothing could be triangulated.
+std::optional<RefineRoundsResult> RefineInRounds(const Colmap& colmap,
+                                                 const TriangulationInput& input,
+                                                 const Reconstruction& seed,
+                                                 const RefineRoundsOptions& options);
+
+}  // namespace vgtw

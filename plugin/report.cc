@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/report.h"
+
+#include "bridge/colmap_model.h"
+#include "bridge/mask_apply.h"
+#include "bridge/predictions.h"
+#include "plugin/table.h"
+#include "scene/error.h"
+
+#include <algorithm>
+
+namespace vgtw {
+namespace {
+
+using nlohmann::json;
+
+size_t NumObservations(const Image& image) {
+  return static_cast<size_t>(
+      std::count_if(image.points2D.begin(), image.points2D.end(), [](const Point2D& point2D) {
+        return point2D.HasPoint3D();
+      }));
+}
+
+std::vector<ViewReport> ReportViews(const Workspace& workspace,
+                                    const PipelineOptions& options,
+                                    const Reconstruction& feedforward,
+                                    const Reconstruction& refined) {
+  const auto features =
+      CountExcludedKeypoints(workspace.database(),
+                             options.use_masks ? workspace.masks() : std::filesystem::path(),
+                             options.num_threads);
+  std::map<std::string, const ApplyMasksImageSummary*> features_by_name;
+  for (const auto& summary : features) features_by_name[summary.image_name] = &summary;
+  std::map<std::string, double> change_deg_by_name;
+  if (const auto change =
+          ComparePoses(CamFromWorldByName(refined), CamFromWorldByName(feedforward))) {
+    for (const auto& view : change->views) change_deg_by_name[view.name] = view.rotation_deg;
+  }
+  const json stages = workspace.record().value("stages", json::object());
+  std::vector<ViewReport> views;
+  for (const auto& [id, image] : refined.images) {
+    ViewReport view;
+    view.name = image.name;
+    if (const auto found = features_by_name.find(image.name); found != features_by_name.end()) {
+      view.num_keypoints = found->second->num_keypoints;
+      view.num_excluded_keypoints = found->second->num_excluded_keypoints;
+    }
+    if (stages.contains("masks")) {
+      view.excluded_share = stages["masks"]["result"]["excluded_share"].value(image.name, 0.0);
+    }
+    view.num_observations = NumObservations(image);
+    view.rotation_change_deg = change_deg_by_name[image.name];
+    view.is_refined = view.num_observations >= static_cast<size_t>(options.min_num_observations);
+    views.push_back(view);
+  }
+  std::sort(views.begin(), views.end(), [](const ViewReport& a, const ViewReport& b) {
+    return a.name < b.name;
+  });
+  return views;
+}
+
+std::string PoseLine(const char* label, const PoseComparison& error) {
+  return std::string(label) + ": centres " + FormatNumber(error.centre_rmse_percent, 3) +
+         " % of extent (RMSE), rotations " + FormatNumber(error.rotation_mean_deg, 3) +
+         " deg (mean), relative rotations " + FormatNumber(error.relative_rotation_median_deg, 3) +
+         " deg (median of pairs); Sim3-aligned on centres, " + std::to_string(error.views.size()) +
+         " views\n";
+}
+
+std::vector<std::string> StatsRow(const char* label, const ReprojectionStats& stats) {
+  return {label,
+          std::to_string(stats.num_images),
+          std::to_string(stats.num_points3D),
+          std::to_string(stats.num_observations),
+          FormatNumber(stats.mean_track_length, 2),
+          FormatNumber(stats.median_px, 3),
+          FormatNumber(stats.p90_px, 3)};
+}
+
+}  // namespace
+
+json OptionsAsJson(const PipelineOptions& options) {
+  return {{"mask",
+           {{"use_masks", options.use_masks},
+            {"threshold", options.mask.threshold},
+            {"dilate_px", options.mask.dilate_px},
+            {"erode_px", options.mask.erode_px},
+            {"min_area_px", options.mask.min_area_px},
+            {"fill_holes_px", options.mask.fill_holes_px},
+            {"unknown", options.mask.unknown == UnknownPolicy::kKeep ? "keep" : "exclude"}}},
+          {"features",
+           {{"max_num_features", options.max_num_features},
+            {"max_image_size", options.max_image_size},
+            {"use_gpu", options.use_gpu},
+            {"shared_camera", options.shared_camera}}},
+          {"matches",
+           {{"matcher", options.matcher == Matcher::kExhaustive ? "exhaustive" : "sequential"},
+            {"sequential_overlap", options.sequential_overlap}}},
+          {"refine",
+           {{"num_rounds", options.num_refine_rounds},
+            {"min_num_observations", options.min_num_observations},
+            {"refine_extra_params", options.refine_extra_params}}}};
+}
+
+json AsJson(const ReprojectionStats& stats) {
+  return {{"num_images", stats.num_images},
+          {"num_points3D", stats.num_points3D},
+          {"num_observations", stats.num_observations},
+          {"num_behind_camera", stats.num_behind_camera},
+          {"median_px", stats.median_px},
+          {"mean_px", stats.mean_px},
+          {"p90_px", stats.p90_px},
+          {"mean_track_length", stats.mean_track_length}};
+}
+
+json AsJson(const PoseComparison& comparison) {
+  json views = json::array();
+  for (const ViewPoseError& view : comparison.views) {
+    views.push_back(
+        {{"name", view.name}, {"rotation_deg", view.rotation_deg}, {"centre", view.centre}});
+  }
+  return {{"alignment", "Sim3 on camera centres"},
+          {"num_missing", comparison.num_missing},
+          {"extent", comparison.extent},
+          {"centre_rmse", comparison.centre_rmse},
+          {"centre_rmse_percent", comparison.centre_rmse_percent},
+          {"rotation_mean_deg", comparison.rotation_mean_deg},
+          {"rotation_median_deg", comparison.rotation_median_deg},
+          {"relative_rotation_median_deg", comparison.relative_rotation_median_deg},
+          {"relative_direction_median_deg", comparison.relative_direction_median_deg},
+          {"views", views}};
+}
+
+json AsJson(const RefineRoundsResult& result) {
+  json rounds = json::array();
+  for (const BundleAdjustmentSummary& round : result.rounds) {
+    rounds.push_back({{"success", round.success},
+                      {"message", round.message},
+                      {"num_residuals", round.num_residuals},
+                      {"initial_cost", round.initial_cost},
+                      {"final_cost", round.final_cost},
+                      {"num_iterations", round.num_iterations},
+                      {"gauge", round.gauge}});
+  }
+  return {{"rounds", rounds}, {"held_views", result.held_views}};
+}
+
+json AsJson(const PipelineReport& report) {
+  json views = json::array();
+  for (const ViewReport& view : report.views) {
+    views.push_back({{"name", view.name},
+                     {"num_keypoints", view.num_keypoints},
+                     {"num_excluded_keypoints", view.num_excluded_keypoints},
+                     {"excluded_share", view.excluded_share},
+                     {"num_observations", view.num_observations},
+                     {"rotation_change_deg", view.rotation_change_deg},
+                     {"status", view.is_refined ? "refined" : "kept feed-forward pose"}});
+  }
+  json object = {{"views", views},
+                 {"feedforward", AsJson(report.feedforward)},
+                 {"refined", AsJson(report.refined)},
+                 {"num_verified_pairs", report.num_matched_pairs},
+                 {"notes", report.notes}};
+  if (report.feedforward_error) object["feedforward_error"] = AsJson(*report.feedforward_error);
+  if (report.refined_error) object["refined_error"] = AsJson(*report.refined_error);
+  return object;
+}
+
+std::map<std::string, Rigid3d> ReadPoses(const std::filesystem::path& path) {
+  if (IsModelFolder(path)) return CamFromWorldByName(ReadModel(path));
+  if (!std::filesystem::exists(path / "predictions.json")) {
+    Fail(path, "holds neither", "a COLMAP model or a predictions folder");
+  }
+  std::map<std::string, Rigid3d> poses;
+  const PredictionReader predictions(path);
+  for (const View& view : predictions.views()) poses[view.name] = view.cam_from_world;
+  return poses;
+}
+
+PipelineReport MakeReport(const Workspace& workspace, const PipelineOptions& options) {
+  const Reconstruction feedforward = ReadModel(workspace.feedforward());
+  const Reconstruction refined = ReadModel(workspace.refined());
+  PipelineReport report;
+  report.views = ReportViews(workspace, options, feedforward, refined);
+  report.feedforward = ComputeReprojectionStats(feedforward);
+  report.refined = ComputeReprojectionStats(refined);
+  report.num_matched_pairs =
+      workspace.record()["stages"]["matches"]["result"].value("num_verified_pairs", size_t{0});
+  if (options.reference_path.empty()) return report;
+  const auto reference = ReadPoses(options.reference_path);
+  report.feedforward_error = ComparePoses(CamFromWorldByName(feedforward), reference);
+  report.refined_error = ComparePoses(CamFromWorldByName(refined), reference);
+  if (!report.refined_error) {
+    report.notes.push_back("the reference shares fewer than 3 views in general position");
+  }
+  return report;
+}
+
+std::string FormatReport(const PipelineReport& report) {
+  std::vector<std::vector<std::string>> views = {
+      {"photo", "excluded %", "keypoints", "in mask", "observations", "turned deg", "status"}};
+  for (const ViewReport& view : report.views) {
+    views.push_back({view.name,
+                     FormatNumber(100.0 * view.excluded_share, 1),
+                     std::to_string(view.num_keypoints),
+                     std::to_string(view.num_excluded_keypoints),
+                     std::to_string(view.num_observations),
+                     FormatNumber(view.rotation_change_deg, 3),
+                     view.is_refined ? "refined" : "kept"});
+  }
+  std::string text = FormatTable(views) + "\n";
+  text +=
+      FormatTable({{"model", "images", "points", "observations", "track", "median px", "p90 px"},
+                   StatsRow("feed-forward", report.feedforward),
+                   StatsRow("refined", report.refined)});
+  if (report.feedforward_error && report.refined_error) {
+    text += "\nAgainst the reference\n";
+    text += PoseLine("  feed-forward", *report.feedforward_error);
+    text += PoseLine("  refined     ", *report.refined_error);
+  }
+  for (const std::string& note : report.notes) text += "note: " + note + "\n";
+  return text;
+}
+
+}  // namespace vgtw

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "plugin/pipeline.h"
+#include "plugin/refine_rounds.h"
+#include "plugin/workspace.h"
+#include "scene/rigid3d.h"
+
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+namespace vgtw {
+
+// The resolved options as run.json keeps them, grouped by the stage that they concern:
+// "mask", "features", "matches", "refine".
+nlohmann::json OptionsAsJson(const PipelineOptions& options);
+
+nlohmann::json AsJson(const ReprojectionStats& stats);
+nlohmann::json AsJson(const PoseComparison& comparison);
+nlohmann::json AsJson(const RefineRoundsResult& result);
+nlohmann::json AsJson(const PipelineReport& report);
+
+// Poses by image name of a COLMAP model or a predictions folder. Throws Error if it is neither.
+std::map<std::string, Rigid3d> ReadPoses(const std::filesystem::path& path);
+
+// Reads the two models of a finished workspace and says what each photo and each step brought.
+PipelineReport MakeReport(const Workspace& workspace, const PipelineOptions& options);
+
+}  // namespace vgtw

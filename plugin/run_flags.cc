@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/run_flags.h"
+
+namespace vgtw {
+
+void RunFlags::Declare(Flags& flags) {
+  mask_.Declare(flags);
+  flags.Group("Features and matches (colmap)")
+      .Add("colmap", &options_.colmap, "The colmap executable; empty = the one on PATH")
+      .AddChoice("matcher", &matcher_, {"exhaustive", "sequential"}, "Which pairs are matched")
+      .Add("sequential_overlap", &options_.sequential_overlap, "Neighbours of a sequence")
+      .Add("max_num_features", &options_.max_num_features, "Features per photo")
+      .Add("max_image_size", &options_.max_image_size, "Larger photos are reduced, pixels")
+      .Add("use_gpu", &options_.use_gpu, "Let colmap use its GPU code");
+  flags.Group("Refinement")
+      .Add("shared_camera", &options_.shared_camera, "One camera for all photos of a size")
+      .Add("refine_extra_params", &options_.refine_extra_params, "Also refine lens distortion")
+      .Add("num_rounds", &options_.num_refine_rounds, "Triangulate and adjust this often")
+      .Add("min_num_observations",
+           &options_.min_num_observations,
+           "A photo with fewer observations keeps its feed-forward pose");
+}
+
+void RunFlags::ApplyTo(PipelineOptions& options) const {
+  options.mask = mask_.Options();
+  options.colmap = options_.colmap;
+  options.matcher = matcher_ == "sequential" ? Matcher::kSequential : Matcher::kExhaustive;
+  options.sequential_overlap = options_.sequential_overlap;
+  options.max_num_features = options_.max_num_features;
+  options.max_image_size = options_.max_image_size;
+  options.use_gpu = options_.use_gpu;
+  options.shared_camera = options_.shared_camera;
+  options.refine_extra_params = options_.refine_extra_params;
+  options.num_refine_rounds = options_.num_refine_rounds;
+  options.min_num_observations = options_.min_num_observations;
+}
+
+}  // namespace vgtw
