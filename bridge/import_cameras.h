@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "bridge/import_photos.h"
+#include "scene/camera.h"
+#include "scene/view.h"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace vgtw {
+
+// Intrinsics in network pixels as an exact PINHOLE of the original ones:
+//   pixel_in_original = original_from_network * K * ray.
+// K has its principal point in continuous pixels (a centred lens has cx = W / 2). nullopt if K is
+// not finite, has skew or a wrong last row, or a focal length <= 0.
+std::optional<Camera> CameraFromNetwork(const Eigen::Matrix3d& network_intrinsics,
+                                        const NetworkGeometry& geometry,
+                                        const ImageSize& photo_size);
+
+// Whether `size` is `from` resized with its aspect, up to rounding to whole pixels.
+bool IsResized(const ImageSize& from, const ImageSize& size);
+
+// Cameras for formats that bring none: the parameters of --camera_params ("f" or "fx,fy,cx,cy" in
+// original pixels), else the focal length of the photo's EXIF, else 1.2 * max(width, height).
+class CameraSource {
+ public:
+  // Throws Error if `camera_params` is not one of these forms, or names a principal point for
+  // photos of different sizes.
+  CameraSource(std::filesystem::path image_folder,
+               const std::vector<Photo>& photos,
+               std::string_view camera_params);
+
+  Camera Make(const Photo& photo);
+
+  // "" or what a user should know of guessed focal lengths, for all that Make() has made.
+  std::string Warning() const;
+
+ private:
+  std::filesystem::path image_folder_;
+  std::vector<double> params_;
+  size_t num_made_ = 0;
+  size_t num_guessed_ = 0;
+};
+
+}  // namespace vgtw

@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bridge/import_arrays.h"
+#include "bridge/import_cameras.h"
+#include "bridge/import_geometry.h"
+#include "bridge/importer.h"
+#include "bridge/npz.h"
+#include "scene/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+#include <utility>
+
+namespace vgtw {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+
+// Bars and padding hold values too, but no photo is below them.
+void ForgetBars(const NetworkGeometry& geometry,
+                const ImageSize& size,
+                ViewPrediction& prediction) {
+  for (int y = 0; y < geometry.network_height; ++y) {
+    for (int x = 0; x < geometry.network_width; ++x) {
+      if (IsOnPhoto(geometry, size, x, y)) continue;
+      if (!prediction.depth.empty()) prediction.depth(x, y) = kUnknown;
+      if (!prediction.depth_conf.empty()) prediction.depth_conf(x, y) = kUnknown;
+      if (!prediction.distractor.empty()) prediction.distractor(x, y) = kUnknown;
+      if (!prediction.points.empty()) prediction.points(x, y).setConstant(kUnknown);
+    }
+  }
+}
+
+// A coarse grid of the point map.
+std::vector<Anchor> MakeAnchors(const NetworkGeometry& geometry,
+                                const Grid<Eigen::Vector3f>& points) {
+  constexpr int kPerSide = 24;
+  std::vector<Anchor> anchors;
+  if (points.empty()) return anchors;
+  const int step_x = std::max(1, points.width() / kPerSide);
+  const int step_y = std::max(1, points.height() / kPerSide);
+  for (int y = step_y / 2; y < points.height(); y += step_y) {
+    for (int x = step_x / 2; x < points.width(); x += step_x) {
+      if (!points(x, y).allFinite()) continue;
+      const Eigen::Vector2d pixel =
+          Apply(geometry.original_from_network, Eigen::Vector2d(x + 0.5, y + 0.5));
+      anchors.push_back({points(x, y).cast<double>(), pixel});
+    }
+  }
+  return anchors;
+}
+
+// Turns arrays into views of the photos and counts what had to be left out.
+class ArrayImport {
+ public:
+  ArrayImport(const ImportJob& job, const ViewSink& sink, ImportSummary& summary)
+      : job_(job),
+        sink_(sink),
+        summary_(summary),
+        cameras_(job.image_folder, job.photos, job.options.camera_params) {}
+
+  // One geometry per element of `photo_indices`.
+  void Resolve(const std::vector<size_t>& photo_indices, const std::vector<MapSize>& map_sizes) {
+    std::vector<ImageSize> sizes;
+    for (const size_t idx : photo_indices) sizes.push_back(job_.photos[idx].size);
+    ResolvedResize resolved = ResolveResize(job_.input_path, sizes, map_sizes, job_.options.resize);
+    summary_.resize = resolved.resize;
+    if (!resolved.warning.empty()) summary_.warnings.push_back(resolved.warning);
+    geometries_ = std::move(resolved.geometries);
+  }
+
+  // `geometry_idx` is an index into what Resolve() was given; nullopt if the view has no maps.
+  void Add(const fs::path& path,
+           size_t photo_idx,
+           std::optional<size_t> geometry_idx,
+           ViewArrays arrays) {
+    const Photo& photo = job_.photos[photo_idx];
+    ImportedView imported;
+    imported.photo_idx = photo_idx;
+    ViewPrediction& prediction = imported.prediction;
+    prediction.view.name = photo.name;
+    NetworkGeometry geometry;
+    if (geometry_idx) geometry = geometries_[*geometry_idx];
+    const std::optional<Camera> camera =
+        arrays.intrinsic ? CameraFromNetwork(*arrays.intrinsic, geometry, photo.size)
+                         : cameras_.Make(photo);
+    if (!camera || !arrays.extrinsic.allFinite()) {
+      bad_views_.push_back(photo.name);
+      return;
+    }
+    prediction.view.camera = *camera;
+    imported.pose = MakePose(path, photo.name, arrays.extrinsic);
+    prediction.view.cam_from_world = CamFromWorld(imported.pose, job_.options.repair);
+    prediction.view.network_width = geometry.network_width;
+    prediction.view.network_height = geometry.network_height;
+    prediction.view.original_from_network = geometry.original_from_network;
+    prediction.depth = std::move(arrays.depth);
+    prediction.depth_conf = std::move(arrays.depth_conf);
+    prediction.distractor = std::move(arrays.distractor);
+    prediction.points = std::move(arrays.points);
+    ForgetBars(geometry, photo.size, prediction);
+    imported.anchors = MakeAnchors(geometry, prediction.points);
+    sink_(std::move(imported));
+  }
+
+  void Finish() {
+    if (!bad_views_.empty()) {
+      summary_.warnings.push_back(std::to_string(bad_views_.size()) +
+                                  " views are left out: their pose or intrinsics are not finite or "
+                                  "have no positive focal length (first: " +
+                                  Printable(bad_views_.front()) + ")");
+    }
+    if (const std::string warning = cameras_.Warning(); !warning.empty()) {
+      summary_.warnings.push_back(warning);
+    }
+  }
+
+  void NoteMask(const ArrayViews& views) {
+    if (!views.has_mask_without_logits() || noted_mask_) return;
+    noted_mask_ = true;
+    summary_.notes.emplace_back(
+        "depth_mask holds only 0 and 1, so it was read as a mask (1 = distractor), not as logits");
+  }
+
+ private:
+  static FilePose MakePose(const fs::path& path,
+                           const std::string& name,
+                           const Eigen::Matrix<double, 3, 4>& extrinsic) {
+    const std::optional<Rigid3d> transform = RigidFromMatrix(extrinsic);
+    if (!transform) {
+      Fail(path,
+           "the 3x3 part of the extrinsic of " + Printable(name) + " is no rotation",
+           "[R|t] with R R^T = 1 and determinant +1");
+    }
+    return {*transform, /*is_world_from_cam=*/false, RotationForm::kMatrix};
+  }
+
+  const ImportJob& job_;
+  const ViewSink& sink_;
+  ImportSummary& summary_;
+  CameraSource cameras_;
+  std::vector<NetworkGeometry> geometries_;
+  std::vector<std::string> bad_views_;
+  bool noted_mask_ = false;
+};
+
+void CheckMapSize(const ArrayViews& views, const fs::path& path) {
+  if (views.has_intrinsic() && !views.map_size()) {
+    Fail(path,
+         "has intrinsics in network pixels but no map that tells the network's size",
+         "one of depth, depth_conf, depth_mask, world_points");
+  }
+}
+
+bool HasExtrinsic(const ArrayStore& store) {
+  return store.Contains("extrinsic") || store.Contains("extrinsics");
+}
+
+bool IsZipFile(const fs::path& path) {
+  return fs::is_regular_file(path) && path.extension() == ".npz";
+}
+
+bool HoldsArrays(const fs::path& path) {
+  return (IsZipFile(path) || fs::is_directory(path)) && HasExtrinsic(*OpenArrayStore(path));
+}
+
+// --- All views in one store -----------------------------------------------------------------
+
+std::optional<fs::path> LocateStack(const fs::path& input_path, const PhotoIndex&) {
+  if (HoldsArrays(input_path)) return input_path;
+  const fs::path inside = input_path / "predictions.npz";
+  if (fs::is_directory(input_path) && IsZipFile(inside) && HoldsArrays(inside)) return inside;
+  return std::nullopt;
+}
+
+void ReadStack(const ImportJob& job, const ViewSink& sink, ImportSummary& summary) {
+  const auto store = OpenArrayStore(job.input_path);
+  ArrayViews views(*store);
+  if (views.num_views() != job.photos.size()) {
+    Fail(job.input_path,
+         "holds " + std::to_string(views.num_views()) + " views",
+         "one for each of the " + std::to_string(job.photos.size()) + " photos",
+         "name the folder that the network saw by --image_path");
+  }
+  CheckMapSize(views, job.input_path);
+  ArrayImport import(job, sink, summary);
+  if (views.map_size()) {
+    std::vector<size_t> photo_indices(job.photos.size());
+    for (size_t i = 0; i < photo_indices.size(); ++i) photo_indices[i] = i;
+    import.Resolve(photo_indices, std::vector<MapSize>(job.photos.size(), *views.map_size()));
+  }
+  for (size_t i = 0; i < views.num_views(); ++i) {
+    const auto geometry_idx = views.map_size() ? std::optional<size_t>(i) : std::nullopt;
+    import.Add(job.input_path, i, geometry_idx, views.Next());
+  }
+  import.NoteMask(views);
+  import.Finish();
+}
+
+// --- One store per photo --------------------------------------------------------------------
+
+struct StoreOfPhoto {
+  fs::path path;
+  size_t photo_idx = 0;
+};
+
+// Files <name>.npz and folders of .npy below `folder` that name a photo, by photo.
+std::vector<StoreOfPhoto> FindStores(const fs::path& folder, const PhotoIndex& photos) {
+  std::vector<StoreOfPhoto> stores;
+  if (!fs::is_directory(folder)) return stores;
+  for (auto entry = fs::recursive_directory_iterator(folder);
+       entry != fs::recursive_directory_iterator();
+       ++entry) {
+    const fs::path relative = entry->path().lexically_relative(folder);
+    const fs::path name =
+        IsZipFile(entry->path()) ? fs::path(relative).replace_extension() : relative;
+    const bool may_hold = IsZipFile(entry->path()) || entry->is_directory();
+    const std::optional<size_t> photo_idx =
+        may_hold ? photos.Find(name.generic_string(), true) : std::nullopt;
+    if (photo_idx && HoldsArrays(entry->path())) stores.push_back({entry->path(), *photo_idx});
+  }
+  std::sort(stores.begin(), stores.end(), [](const StoreOfPhoto& a, const StoreOfPhoto& b) {
+    return std::tie(a.photo_idx, a.path) < std::tie(b.photo_idx, b.path);
+  });
+  return stores;
+}
+
+std::optional<fs::path> LocateFolder(const fs::path& input_path, const PhotoIndex& photos) {
+  if (FindStores(input_path, photos).empty()) return std::nullopt;
+  return input_path;
+}
+
+void CheckStores(const ImportJob& job, const std::vector<StoreOfPhoto>& stores) {
+  for (size_t i = 1; i < stores.size(); ++i) {
+    if (stores[i].photo_idx != stores[i - 1].photo_idx) continue;
+    Fail(stores[i].path,
+         "and " + stores[i - 1].path.filename().string() + " name the same photo",
+         "one set of arrays a photo");
+  }
+  if (stores.empty()) {
+    Fail(job.input_path, "holds no arrays named like a photo", "<image name or stem>.npz files");
+  }
+}
+
+ArrayViews OpenSingle(const ArrayStore& store) {
+  ArrayViews views(store);
+  if (views.num_views() != 1) {
+    Fail(store.path(), "holds " + std::to_string(views.num_views()) + " views", "one");
+  }
+  CheckMapSize(views, store.path());
+  return views;
+}
+
+void ReadFolder(const ImportJob& job, const ViewSink& sink, ImportSummary& summary) {
+  const std::vector<StoreOfPhoto> stores = FindStores(job.input_path, PhotoIndex(job.photos));
+  CheckStores(job, stores);
+  std::vector<size_t> photo_indices;
+  std::vector<MapSize> map_sizes;
+  std::vector<std::optional<size_t>> geometry_indices(stores.size());
+  for (size_t i = 0; i < stores.size(); ++i) {
+    const auto store = OpenArrayStore(stores[i].path);
+    const ArrayViews views = OpenSingle(*store);
+    if (!views.map_size()) continue;
+    geometry_indices[i] = photo_indices.size();
+    photo_indices.push_back(stores[i].photo_idx);
+    map_sizes.push_back(*views.map_size());
+  }
+  ArrayImport import(job, sink, summary);
+  if (!map_sizes.empty()) import.Resolve(photo_indices, map_sizes);
+  for (size_t i = 0; i < stores.size(); ++i) {
+    const auto store = OpenArrayStore(stores[i].path);
+    ArrayViews views = OpenSingle(*store);
+    import.Add(stores[i].path, stores[i].photo_idx, geometry_indices[i], views.Next());
+    import.NoteMask(views);
+  }
+  import.Finish();
+  if (stores.size() < job.photos.size()) {
+    summary.notes.push_back(std::to_string(job.photos.size() - stores.size()) +
+                            " photos have no arrays and are left out");
+  }
+}
+
+}  // namespace
+
+const Importer kVggtNpzImporter = {ImportFormat::kVggtNpz,
+                                   "vggt_npz",
+                                   "predictions.npz of the demos of VGGT or VGTW",
+                                   LocateStack,
+                                   ReadStack};
+
+const Importer kNpzFolderImporter = {ImportFormat::kNpzFolder,
+                                     "npz_folder",
+                                     "a folder with <image name or stem>.npz per photo",
+                                     LocateFolder,
+                                     ReadFolder};
+
+}  // namespace vgtw
