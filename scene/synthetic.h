@@ -68,6 +68,7 @@ class SyntheticScene {
   std::optional<Eigen::Vector3d> StaticPoint(size_t view_idx, const Eigen::Vector2d& pixel) const;
 
  private:
+  friend Prediction MakeTruePrediction(const SyntheticScene& scene, int network_width);
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
@@ -75,7 +76,7 @@ class SyntheticScene {
 // What a perfect network of input width `network_width` (VGGT's crop loader) would say: true poses
 // and intrinsics, static depth resampled at network pixel centres (NaN where a depth edge makes it
 // ambiguous), depth_conf 1..10 falling with depth and 1 on distractors, distractor probabilities
-// 0 or 1 by nearest pixel. Renders every view once.
+// 0 or 1 by nearest pixel. No picture is rendered.
 Prediction MakeTruePrediction(const SyntheticScene& scene, int network_width = 518);
 
 }  // namespace vgtw

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace vgtw {
+
+// Random numbers that are the same with every compiler, standard library and number of threads
+// (the distributions of <random> are not): a stream is a function of its key alone.
+
+// A well mixed 64-bit key of a sequence of numbers, for instance {seed, kind, view_idx}.
+uint64_t HashKey(std::initializer_list<uint64_t> values);
+
+class RandomStream {
+ public:
+  explicit RandomStream(uint64_t key) : state_(key) {}
+
+  uint64_t Bits();
+  double Uniform();                        // [0, 1)
+  double Uniform(double min, double max);  // [min, max)
+  double Normal();                         // mean 0, sigma 1 (Box-Muller)
+  Eigen::Vector3d NormalVector();          // three independent Normal()
+  Eigen::Quaterniond Rotation();           // uniform on SO(3)
+
+ private:
+  uint64_t state_;
+};
+
+}  // namespace vgtw
