@@ -10,7 +10,9 @@
 namespace vgtw {
 
 // Random numbers that are the same with every compiler, standard library and number of threads
-// (the distributions of <random> are not): a stream is a function of its key alone.
+// (the distributions of <random> are not), up to the last bit of std::log and std::cos: a stream is
+// a function of its key alone. The order of draws counts, and C++ leaves the order of arguments and
+// operands open: draw in separate statements or in a braced list.
 
 // A well mixed 64-bit key of a sequence of numbers, for instance {seed, kind, view_idx}.
 uint64_t HashKey(std::initializer_list<uint64_t> values);

@@ -186,8 +186,8 @@ std::vector<Shape> MakeStaticShapes(const SyntheticOptions& options) {
     }
   };
   for (int i = 0; i < 7; ++i) {
-    const Eigen::Vector3d half_size(
-        random.Uniform(0.2, 0.5), random.Uniform(0.2, 0.5), random.Uniform(0.25, 0.85));
+    const Eigen::Vector3d half_size{
+        random.Uniform(0.2, 0.5), random.Uniform(0.2, 0.5), random.Uniform(0.25, 0.85)};
     furnisher.Add(ShapeKind::kBox, half_size, PlaceInMiddle);
   }
   for (int i = 0; i < 3; ++i) {
@@ -195,8 +195,8 @@ std::vector<Shape> MakeStaticShapes(const SyntheticOptions& options) {
     furnisher.Add(ShapeKind::kEllipsoid, Eigen::Vector3d::Constant(radius), PlaceInMiddle);
   }
   for (int i = 0; i < 12; ++i) {
-    const Eigen::Vector3d half_size(
-        random.Uniform(0.2, 0.6), random.Uniform(0.2, 0.6), random.Uniform(0.4, 1.5));
+    const Eigen::Vector3d half_size{
+        random.Uniform(0.2, 0.6), random.Uniform(0.2, 0.6), random.Uniform(0.4, 1.5)};
     furnisher.Add(ShapeKind::kBox, half_size, place_along_wall);
   }
   return shapes;
@@ -243,7 +243,8 @@ MoverState FindMover(const SyntheticOptions& options, const View& view, int move
   const double phase = 2.0 * kPi * (mover + random.Uniform(0.0, 0.5)) / options.num_distractors;
   const double pace = (mover % 2 == 0 ? 1.0 : -1.0) * random.Uniform(0.25, 0.4);
   const double base_distance = random.Uniform(2.6, 3.3);
-  const double yaw_rad = random.Uniform(0.0, 2.0 * kPi) + random.Uniform(-0.12, 0.12) * view_idx;
+  const double first_yaw_rad = random.Uniform(0.0, 2.0 * kPi);
+  const double yaw_rad = first_yaw_rad + random.Uniform(-0.12, 0.12) * view_idx;
   const double lateral = 0.8 * std::sin(phase + pace * view_idx);
   const double distance = (base_distance + 0.2 * std::cos(0.6 * view_idx + phase)) *
                           options.focal_length_factor / kDefaultFocalFactor;
