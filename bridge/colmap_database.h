@@ -54,17 +54,17 @@ using FeatureMatches = std::vector<std::array<uint32_t, 2>>;
 // identity pose, which therefore also read as not set, as do non-finite values.
 struct TwoViewGeometry {
   int config = 0;
-  FeatureMatches inlier_matches;
-  std::optional<Eigen::Matrix3d> F;
-  std::optional<Eigen::Matrix3d> E;
-  std::optional<Eigen::Matrix3d> H;
-  std::optional<Rigid3d> cam2_from_cam1;
+  FeatureMatches inlier_matches = {};
+  std::optional<Eigen::Matrix3d> F = {};
+  std::optional<Eigen::Matrix3d> E = {};
+  std::optional<Eigen::Matrix3d> H = {};
+  std::optional<Rigid3d> cam2_from_cam1 = {};
 };
 
 struct PosePrior {
   ImageId image_id = 0;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // camera centre
-  std::optional<Eigen::Matrix3d> position_covariance;
+  std::optional<Eigen::Matrix3d> position_covariance = {};
   int coordinate_system = 1;  // -1 undefined, 0 WGS84 (lat, lon, alt), 1 cartesian
 };
 

@@ -150,21 +150,6 @@ void TakePosesFromFrames(const fs::path& folder, Reconstruction& reconstruction)
   });
 }
 
-// The law beyond FindFault(Reconstruction) that WriteModel's caller has to keep.
-void CheckWritable(const Reconstruction& reconstruction) {
-  // Frames win when COLMAP reads the model, so that stale ones would undo a change of poses. The
-  // bound is loose against rounding and tight against any step of an optimiser.
-  constexpr double kMaxDifference = 1e-9;
-  const auto fail = [](const std::string& fault) { throw std::invalid_argument(fault); };
-  ForEachFrameImage(reconstruction, fail, [&](const Image& image, const Rigid3d& cam_from_world) {
-    const double difference =
-        (image.cam_from_world.ToMatrix() - cam_from_world.ToMatrix()).cwiseAbs().maxCoeff();
-    const double scale = 1.0 + cam_from_world.translation.cwiseAbs().maxCoeff();
-    VGTW_CHECK(difference <= kMaxDifference * scale,
-               "the frame of image " + image.name + " has another pose; call UpdateFrames");
-  });
-}
-
 // Names are how models are joined, so two images must not share one.
 std::string FindRepeatedName(const Reconstruction& reconstruction) {
   std::set<std::string_view> names;
@@ -172,6 +157,28 @@ std::string FindRepeatedName(const Reconstruction& reconstruction) {
     if (!names.insert(image.name).second) return image.name;
   }
   return "";
+}
+
+// What ReadModel would refuse or undo.
+void CheckWritable(const Reconstruction& reconstruction) {
+  const std::string fault = FindFault(reconstruction);
+  VGTW_CHECK(fault.empty(), fault);
+  for (const auto& [image_id, image] : reconstruction.images) {
+    VGTW_CHECK(IsSafeRelativeName(image.name), "unsafe image name " + Printable(image.name));
+  }
+  const std::string repeated = FindRepeatedName(reconstruction);
+  VGTW_CHECK(repeated.empty(), "two images are named " + repeated);
+  // Frames win when a model is read, so that stale ones would undo a change of poses. The bound is
+  // loose against rounding and tight against any step of an optimiser.
+  constexpr double kMaxDifference = 1e-9;
+  const auto fail = [](const std::string& text) { throw std::invalid_argument(text); };
+  ForEachFrameImage(reconstruction, fail, [&](const Image& image, const Rigid3d& cam_from_world) {
+    const double difference =
+        (image.cam_from_world.ToMatrix() - cam_from_world.ToMatrix()).cwiseAbs().maxCoeff();
+    const double scale = 1.0 + cam_from_world.translation.cwiseAbs().maxCoeff();
+    VGTW_CHECK(difference <= kMaxDifference * scale,
+               "the frame of image " + image.name + " has another pose; call UpdateFrames");
+  });
 }
 
 }  // namespace
@@ -202,8 +209,6 @@ bool IsModelFolder(const fs::path& folder) {
 void WriteModel(const Reconstruction& reconstruction,
                 const fs::path& folder,
                 const WriteModelOptions& options) {
-  const std::string fault = FindFault(reconstruction);
-  VGTW_CHECK(fault.empty(), fault);
   CheckWritable(reconstruction);
   AtomicFolder output(folder, options.overwrite);
   const auto write = [&](const FileKind& kind) {

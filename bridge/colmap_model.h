@@ -11,8 +11,9 @@ namespace vgtw {
 // Like COLMAP: .bin is read if cameras.bin, images.bin and points3D.bin all exist, else .txt.
 // Where frames exist they hold the poses (COLMAP >= 3.12 ignores those in images.*): images'
 // cam_from_world is then sensor_from_rig * rig_from_world.
-// Throws Error if a file is missing, truncated at any place, has counts larger than the file can
-// hold, an unknown camera model, non-finite poses, duplicate ids, or breaks Reconstruction's law.
+// Throws Error if a file is missing, truncated, has counts larger than the file can hold, an
+// unknown camera model, non-finite poses, ids or names twice, names outside the image folder, or
+// breaks Reconstruction's law. In text, Error tells the line.
 Reconstruction ReadModel(const std::filesystem::path& folder);
 
 // Whether the folder holds a model in one of the formats.
@@ -26,8 +27,10 @@ struct WriteModelOptions {
 };
 
 // rigs.* and frames.* are written only if the reconstruction has them. The folder appears complete
-// or not at all. Throws std::invalid_argument if the reconstruction breaks its law (or, in text,
-// has a name with a space), Error if it cannot be written.
+// or not at all. What ReadModel gave is written back byte by byte, except for the order of records,
+// which is by id. Throws std::invalid_argument if the reconstruction breaks its law, has names that
+// ReadModel refuses (in text also a space), or frames with other poses than its images have (see
+// UpdateFrames); Error if it cannot be written.
 void WriteModel(const Reconstruction& reconstruction,
                 const std::filesystem::path& folder,
                 const WriteModelOptions& options = {});

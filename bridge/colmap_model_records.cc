@@ -56,7 +56,6 @@ const CameraModelInfo& FindModelOrFail(const RecordSource& source, std::string_v
 Rigid3d PoseFromValues(const RecordSource& source,
                        const std::string& owner,
                        const PoseValues& values) {
-  constexpr double kRounding = 1e-12;
   constexpr double kMaxDeviation = 0.01;
   const auto is_finite = [](double value) { return std::isfinite(value); };
   if (!std::all_of(values.begin(), values.end(), is_finite)) {
@@ -70,7 +69,7 @@ Rigid3d PoseFromValues(const RecordSource& source,
     source.Fail("has a rotation of " + owner + " of norm " + std::to_string(norm),
                 "a unit quaternion qw qx qy qz");
   }
-  if (std::abs(norm - 1.0) > kRounding) pose.rotation.normalize();
+  if (!FindFault(pose).empty()) pose.rotation.normalize();
   return pose;
 }
 

@@ -27,8 +27,8 @@ struct RecordSource {
 const CameraModelInfo& FindModelOrFail(const RecordSource& source, int model_id);
 const CameraModelInfo& FindModelOrFail(const RecordSource& source, std::string_view name);
 
-// qw qx qy qz tx ty tz as in files. Rotations whose norm is off by up to 1 % (text with few digits)
-// are normalised, those that are unit up to rounding keep their bits.
+// qw qx qy qz tx ty tz as in files. Poses without a fault (see FindFault) keep their bits;
+// rotations whose norm is off by up to 1 % (text with few digits) are normalised.
 using PoseValues = std::array<double, 7>;
 Rigid3d PoseFromValues(const RecordSource& source, const std::string& owner, const PoseValues&);
 PoseValues ValuesFromPose(const Rigid3d& pose);

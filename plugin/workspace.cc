@@ -34,6 +34,7 @@ Workspace::Workspace(fs::path folder, bool overwrite, bool force)
   } else if (fs::exists(folder_) && (!fs::is_directory(folder_) || !fs::is_empty(folder_))) {
     Fail(folder_, "exists and was not made by 'vgtw run'", "a new or empty folder", "name another");
   }
+  if (!record_["stages"].is_object()) record_["stages"] = json::object();
   record_["format"] = kFormat;
   record_["vgtw_version"] = kVersion;
   std::error_code code;

@@ -12,7 +12,8 @@ namespace vgtw {
 
 // A file that appears under its final name only when it is complete: bytes go to a file beside
 // `path`, Commit() flushes, fsyncs and renames. Without Commit() nothing is left behind.
-// Throws Error if the target cannot be written (missing folder, permission, disk full).
+// Throws Error if the target cannot be written (missing folder, permission, disk full, a device).
+// A limit on file sizes must not kill the process first: programs ignore SIGXFSZ.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path path);
@@ -31,8 +32,10 @@ class AtomicFile {
 };
 
 // A folder that appears under its final name only when it is complete: fill path(), then Commit().
-// Law: `path` must not exist, be an empty folder, or `overwrite` be set (then the old folder is
-// replaced as a whole at Commit()). Throws Error otherwise. Without Commit() nothing is left.
+// Parent folders are created. Law: `final_path` must not exist, be an empty folder, or `overwrite`
+// be set (then the old folder is replaced as a whole at Commit()). Throws Error otherwise, also at
+// Commit() if another process filled the folder meanwhile. Without Commit() nothing is left; only a
+// killed process leaves ".<name>.tmp-<pid>-<n>" beside it, which may be deleted.
 class AtomicFolder {
  public:
   AtomicFolder(std::filesystem::path final_path, bool overwrite);
@@ -46,6 +49,7 @@ class AtomicFolder {
  private:
   std::filesystem::path final_path_;
   std::filesystem::path temporary_path_;
+  bool overwrite_ = false;
   bool committed_ = false;
 };
 
@@ -54,7 +58,8 @@ void WriteFileAtomically(const std::filesystem::path& path, std::string_view byt
 // The whole file. Throws Error if it is unreadable or larger than max_bytes.
 std::string ReadFile(const std::filesystem::path& path, size_t max_bytes = size_t{1} << 32);
 
-// A read-only memory map of a whole file; an empty file maps to an empty span.
+// A read-only memory map of a whole file; an empty file maps to an empty span. The file must not
+// shrink meanwhile (files that this project writes are renamed, never rewritten).
 // Throws Error if the file is missing or not a regular file.
 class MappedFile {
  public:

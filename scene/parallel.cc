@@ -5,6 +5,7 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -40,7 +41,12 @@ void ParallelFor(int64_t n,
   const auto num_workers =
       static_cast<size_t>(std::clamp<int64_t>(n, 1, ResolveThreads(num_threads)));
   std::vector<std::thread> threads;
-  for (size_t i = 1; i < num_workers; ++i) threads.emplace_back(run);
+  threads.reserve(num_workers);
+  try {
+    for (size_t i = 1; i < num_workers; ++i) threads.emplace_back(run);
+  } catch (const std::system_error&) {
+    // The system gives no more threads; those that run do all the work.
+  }
   run();
   for (std::thread& thread : threads) thread.join();
   if (first_exception) std::rethrow_exception(first_exception);

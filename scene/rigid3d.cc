@@ -55,7 +55,7 @@ Rigid3d LookAt(const Eigen::Vector3d& centre,
                const Eigen::Vector3d& target,
                const Eigen::Vector3d& up_in_world) {
   const Eigen::Vector3d forward = (target - centre).normalized();
-  const Eigen::Vector3d right = forward.cross(up_in_world);
+  const Eigen::Vector3d right = forward.cross(up_in_world.normalized());
   VGTW_CHECK(right.norm() > 1e-9, "the camera looks along its up direction");
   Eigen::Matrix3d rotation;
   rotation.row(0) = right.normalized();

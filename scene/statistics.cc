@@ -24,4 +24,14 @@ double Percentile(std::vector<double> values, double percent) {
 
 double Median(std::vector<double> values) { return Percentile(std::move(values), 50.0); }
 
+double Diameter(const std::vector<Eigen::Vector3d>& points) {
+  double squared = 0.0;
+  for (size_t i = 0; i < points.size(); ++i) {
+    for (size_t j = i + 1; j < points.size(); ++j) {
+      squared = std::max(squared, (points[i] - points[j]).squaredNorm());
+    }
+  }
+  return std::sqrt(squared);
+}
+
 }  // namespace vgtw

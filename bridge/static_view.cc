@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bridge/static_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace vgtw {
+namespace {
+
+// Bins per longest side in which samples are looked up.
+constexpr double kNumSampleBins = 128.0;
+
+bool Agrees(double measured, double expected, double max_relative_difference) {
+  return std::abs(measured - expected) <= max_relative_difference * measured;
+}
+
+}  // namespace
+
+StaticView::StaticView(ViewPrediction prediction, double distractor_threshold)
+    : prediction_(std::move(prediction)),
+      distractor_threshold_(distractor_threshold),
+      network_from_original_(Inverse(prediction_.view.original_from_network)) {
+  if (prediction_.depth.empty()) TakeDepthFromPoints();
+  if (prediction_.depth.empty()) BinSamples();
+}
+
+void StaticView::TakeDepthFromPoints() {
+  const Grid<Eigen::Vector3f>& points = prediction_.points;
+  prediction_.depth = DepthMap(points.width(), points.height());
+  for (size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d point = points.data()[i].cast<double>();
+    const double depth = (prediction_.view.cam_from_world * point).z();
+    prediction_.depth.data()[i] =
+        depth > 0.0 ? static_cast<float>(depth) : std::numeric_limits<float>::quiet_NaN();
+  }
+}
+
+void StaticView::BinSamples() {
+  const Camera& camera = prediction_.view.camera;
+  bin_edge_px_ = static_cast<double>(std::max(camera.width, camera.height)) / kNumSampleBins;
+  depths_by_bin_ = Grid<std::vector<float>>(
+      static_cast<int>(std::ceil(static_cast<double>(camera.width) / bin_edge_px_)),
+      static_cast<int>(std::ceil(static_cast<double>(camera.height) / bin_edge_px_)));
+  for (const DepthSample& sample : prediction_.depth_samples) {
+    const Eigen::Vector2d pixel = sample.pixel_in_original.cast<double>();
+    const Eigen::Array2i bin = BinOf(pixel);
+    if (!depths_by_bin_.Contains(bin.x(), bin.y()) || !IsStatic(pixel)) continue;
+    depths_by_bin_(bin.x(), bin.y()).push_back(sample.depth);
+  }
+}
+
+Eigen::Array2i StaticView::BinOf(const Eigen::Vector2d& pixel_in_original) const {
+  // Clamped before the conversion, which is undefined for numbers that no int holds.
+  return (pixel_in_original / bin_edge_px_).array().floor().max(-1.0).min(1e6).cast<int>();
+}
+
+void StaticView::AddConfidencesTo(ConfidenceHistogram& histogram) const {
+  const ConfidenceMap& confidence = prediction_.depth_conf;
+  for (size_t i = 0; i < confidence.size() && i < prediction_.depth.size(); ++i) {
+    if (std::isfinite(prediction_.depth.data()[i])) histogram.Add(confidence.data()[i]);
+  }
+  if (!prediction_.depth.empty()) return;
+  for (const DepthSample& sample : prediction_.depth_samples) histogram.Add(sample.confidence);
+}
+
+bool StaticView::IsStatic(const Eigen::Vector2d& pixel_in_original) const {
+  const DistractorMask& distractor = prediction_.distractor;
+  if (distractor.empty()) return true;
+  const Eigen::Vector2d pixel = Apply(network_from_original_, pixel_in_original);
+  if (!(pixel.x() >= 0.0 && pixel.x() < distractor.width() && pixel.y() >= 0.0 &&
+        pixel.y() < distractor.height())) {
+    return false;
+  }
+  return distractor(static_cast<int>(pixel.x()), static_cast<int>(pixel.y())) <
+         distractor_threshold_;
+}
+
+std::vector<StaticView::Point> StaticView::StaticPoints(double confidence_threshold) const {
+  const View& view = prediction_.view;
+  const DepthMap& depth = prediction_.depth;
+  std::vector<Point> points;
+  for (int y = 0; y < depth.height(); ++y) {
+    for (int x = 0; x < depth.width(); ++x) {
+      if (!prediction_.depth_conf.empty() &&
+          !(prediction_.depth_conf(x, y) >= confidence_threshold)) {
+        continue;
+      }
+      const Eigen::Vector2d pixel =
+          Apply(view.original_from_network, Eigen::Vector2d(x + 0.5, y + 0.5));
+      if (!IsStatic(pixel)) continue;
+      if (const auto point = UnprojectPixel(view, depth, x, y)) points.push_back({*point, pixel});
+    }
+  }
+  if (!depth.empty()) return points;
+  for (const DepthSample& sample : prediction_.depth_samples) {
+    const Eigen::Vector2d pixel = sample.pixel_in_original.cast<double>();
+    if (!(sample.confidence >= confidence_threshold) || !IsStatic(pixel)) continue;
+    const auto ray = Unproject(view.camera, pixel);
+    if (!ray) continue;
+    points.push_back({Inverse(view.cam_from_world) * (sample.depth * ray->homogeneous()), pixel});
+  }
+  return points;
+}
+
+bool StaticView::SampleAgrees(const Eigen::Vector2d& pixel_in_original,
+                              double depth,
+                              double max_relative_depth_difference) const {
+  const Eigen::Array2i bin = BinOf(pixel_in_original);
+  for (int y = bin.y() - 1; y <= bin.y() + 1; ++y) {
+    for (int x = bin.x() - 1; x <= bin.x() + 1; ++x) {
+      if (!depths_by_bin_.Contains(x, y)) continue;
+      for (const float measured : depths_by_bin_(x, y)) {
+        if (Agrees(measured, depth, max_relative_depth_difference)) return true;
+      }
+    }
+  }
+  return false;
+}
+
+std::optional<Eigen::Vector2d> StaticView::See(const Eigen::Vector3d& point_in_world,
+                                               double max_relative_depth_difference) const {
+  const View& view = prediction_.view;
+  const Eigen::Vector3d point_in_cam = view.cam_from_world * point_in_world;
+  const std::optional<Eigen::Vector2d> pixel = Project(view.camera, point_in_cam);
+  if (!pixel || !(pixel->x() >= 0.0 && pixel->x() < static_cast<double>(view.camera.width) &&
+                  pixel->y() >= 0.0 && pixel->y() < static_cast<double>(view.camera.height))) {
+    return std::nullopt;
+  }
+  if (!IsStatic(*pixel)) return std::nullopt;
+  bool agrees = false;
+  if (prediction_.depth.empty()) {
+    agrees = SampleAgrees(*pixel, point_in_cam.z(), max_relative_depth_difference);
+  } else if (const auto measured =
+                 SampleDepth(prediction_.depth, Apply(network_from_original_, *pixel))) {
+    agrees = Agrees(*measured, point_in_cam.z(), max_relative_depth_difference);
+  }
+  return agrees ? pixel : std::nullopt;
+}
+
+}  // namespace vgtw
