@@ -29,5 +29,11 @@ TEST(Percentile, RefusesNothingAndPercentOutsideItsRange) {
   EXPECT_THROW(Percentile({1.0}, 100.1), std::invalid_argument);
 }
 
+TEST(Diameter, IsTheLargestDistance) {
+  EXPECT_EQ(Diameter({}), 0.0);
+  EXPECT_EQ(Diameter({{1.0, 2.0, 3.0}}), 0.0);
+  EXPECT_EQ(Diameter({{0.0, 0.0, 0.0}, {1.0, 1.0, 0.0}, {3.0, 0.0, 4.0}}), 5.0);
+}
+
 }  // namespace
 }  // namespace vgtw

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evaluation/pose_error.h"
+
+#include <cmath>
+#include <map>
+#include <random>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace vgtw {
+namespace {
+
+using Poses = std::map<std::string, Rigid3d>;
+
+Rigid3d AtCentre(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& centre) {
+  return {rotation, -(rotation * centre)};
+}
+
+Poses RandomPoses(int num_views, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  Poses poses;
+  for (int i = 0; i < num_views; ++i) {
+    const Eigen::Quaterniond rotation =
+        Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random))
+            .normalized();
+    poses["view" + std::to_string(i)] =
+        AtCentre(rotation, Eigen::Vector3d(normal(random), normal(random), normal(random)));
+  }
+  return poses;
+}
+
+// Four cameras with identity rotation on the corners of a 2 x 2 square.
+Poses SquareOfCameras() {
+  const Eigen::Quaterniond identity = Eigen::Quaterniond::Identity();
+  return {{"a", AtCentre(identity, {1, 1, 0})},
+          {"b", AtCentre(identity, {-1, 1, 0})},
+          {"c", AtCentre(identity, {-1, -1, 0})},
+          {"d", AtCentre(identity, {1, -1, 0})}};
+}
+
+Poses Moved(const Sim3d& to_from_from, const Poses& poses) {
+  Poses moved;
+  for (const auto& [name, pose] : poses) moved[name] = TransformCamera(to_from_from, pose);
+  return moved;
+}
+
+TEST(ComparePoses, EqualPosesHaveNoError) {
+  const Poses poses = RandomPoses(6, 1);
+  const auto comparison = ComparePoses(poses, poses);
+  ASSERT_TRUE(comparison);
+  // Rounding of unit-sized quantities.
+  EXPECT_LT(comparison->centre_rmse, 1e-13);
+  EXPECT_LT(comparison->rotation_mean_deg, 1e-12);
+  EXPECT_LT(comparison->relative_rotation_median_deg, 1e-12);
+  EXPECT_LT(comparison->relative_direction_median_deg, 1e-12);
+  EXPECT_EQ(comparison->num_missing, 0u);
+  EXPECT_EQ(comparison->views.size(), 6u);
+  EXPECT_EQ(comparison->views.front().name, "view0");
+}
+
+TEST(ComparePoses, FiguresOfOneShiftedAndOneTurnedCamera) {
+  const Poses reference = SquareOfCameras();
+  Poses estimate = reference;
+  // Out of the square's plane alternately: such a pattern is orthogonal to every similarity of the
+  // square, so that the alignment stays the identity up to scale.
+  const double offset = 0.1;
+  const double angle_deg = 8.0;
+  for (const char* name : {"a", "c"}) {
+    estimate[name] = AtCentre(estimate[name].rotation,
+                              OriginInSource(estimate[name]) + Eigen::Vector3d(0, 0, offset));
+  }
+  for (const char* name : {"b", "d"}) {
+    estimate[name] = AtCentre(estimate[name].rotation,
+                              OriginInSource(estimate[name]) - Eigen::Vector3d(0, 0, offset));
+  }
+  estimate["b"] = AtCentre(RotationAboutAxis({0, 0, 1}, angle_deg), OriginInSource(estimate["b"]));
+  const auto comparison = ComparePoses(estimate, reference);
+  ASSERT_TRUE(comparison);
+
+  // Umeyama's scale: <ref, est> / <est, est> = 8 / (8 + 4 offset^2).
+  const double scale = 8.0 / (8.0 + 4.0 * offset * offset);
+  EXPECT_NEAR(comparison->reference_from_estimate.scale, scale, 1e-12);
+  const double squared = 2.0 * (1.0 - scale) * (1.0 - scale) + scale * scale * offset * offset;
+  EXPECT_NEAR(comparison->centre_rmse, std::sqrt(squared), 1e-12);
+  EXPECT_NEAR(comparison->views[1].centre, std::sqrt(squared), 1e-12);
+  EXPECT_NEAR(comparison->extent, std::sqrt(8.0), 1e-12);
+  EXPECT_NEAR(comparison->centre_rmse_percent, 100.0 * std::sqrt(squared / 8.0), 1e-10);
+
+  EXPECT_NEAR(comparison->views[0].rotation_deg, 0.0, 1e-9);
+  EXPECT_NEAR(comparison->views[1].rotation_deg, angle_deg, 1e-9);
+  EXPECT_NEAR(comparison->rotation_mean_deg, angle_deg / 4.0, 1e-9);
+  EXPECT_NEAR(comparison->rotation_median_deg, 0.0, 1e-9);
+  // Three of six pairs contain b: half zeros, half angle.
+  EXPECT_NEAR(comparison->relative_rotation_median_deg, angle_deg / 2.0, 1e-9);
+}
+
+TEST(ComparePoses, DirectionIsTakenInTheFirstCamerasFrame) {
+  const Poses reference = SquareOfCameras();
+  Poses estimate = reference;
+  // Turning "a" changes the directions a->b, a->c, a->d; turning the last camera changes none.
+  estimate["a"] = AtCentre(RotationAboutAxis({0, 0, 1}, 10.0), OriginInSource(estimate["a"]));
+  EXPECT_NEAR(ComparePoses(estimate, reference)->relative_direction_median_deg, 5.0, 1e-9);
+  estimate = reference;
+  estimate["d"] = AtCentre(RotationAboutAxis({0, 0, 1}, 10.0), OriginInSource(estimate["d"]));
+  EXPECT_NEAR(ComparePoses(estimate, reference)->relative_direction_median_deg, 0.0, 1e-9);
+}
+
+TEST(ComparePoses, ASimilarityOfTheEstimateChangesNothing) {
+  const Poses reference = RandomPoses(8, 2);
+  Poses estimate = RandomPoses(8, 3);  // far off: every figure is large
+  const Sim3d similarity = {3.7, RotationAboutAxis({0, 0.6, 0.8}, 77.0), {5.0, -2.0, 11.0}};
+  const auto before = ComparePoses(estimate, reference);
+  const auto after = ComparePoses(Moved(similarity, estimate), reference);
+  ASSERT_TRUE(before);
+  ASSERT_TRUE(after);
+  // Rounding, amplified by the size of the similarity.
+  EXPECT_NEAR(after->centre_rmse, before->centre_rmse, 1e-11);
+  EXPECT_NEAR(after->centre_rmse_percent, before->centre_rmse_percent, 1e-9);
+  EXPECT_NEAR(after->rotation_mean_deg, before->rotation_mean_deg, 1e-9);
+  EXPECT_NEAR(after->relative_rotation_median_deg, before->relative_rotation_median_deg, 1e-9);
+  EXPECT_NEAR(after->relative_direction_median_deg, before->relative_direction_median_deg, 1e-9);
+  EXPECT_GT(before->relative_direction_median_deg, 10.0);
+}
+
+TEST(ComparePoses, CountsViewsThatTheEstimateLacks) {
+  const Poses reference = RandomPoses(6, 4);
+  Poses estimate = reference;
+  estimate.erase("view2");
+  estimate.erase("view5");
+  estimate["elsewhere"] = Rigid3d();
+  const auto comparison = ComparePoses(estimate, reference);
+  ASSERT_TRUE(comparison);
+  EXPECT_EQ(comparison->num_missing, 2u);
+  ASSERT_EQ(comparison->views.size(), 4u);
+  EXPECT_EQ(comparison->views[2].name, "view3");
+  EXPECT_EQ(comparison->extent, ComparePoses(reference, reference)->extent);
+}
+
+TEST(ComparePoses, PairsInOnePlaceHaveNoDirection) {
+  Poses reference = SquareOfCameras();
+  reference["e"] = reference["a"];
+  Poses estimate = reference;
+  estimate["e"].rotation = RotationAboutAxis({1, 0, 0}, 3.0);
+  estimate["e"].translation = -(estimate["e"].rotation * Eigen::Vector3d(1, 1, 0));
+  const auto comparison = ComparePoses(estimate, reference);
+  ASSERT_TRUE(comparison);
+  EXPECT_NEAR(comparison->relative_direction_median_deg, 0.0, 1e-9);
+  EXPECT_NEAR(comparison->rotation_mean_deg, 3.0 / 5.0, 1e-9);
+}
+
+TEST(ComparePoses, IsUndeterminedForTwoViewsAndForCollinearCentres) {
+  Poses two = SquareOfCameras();
+  two.erase("c");
+  two.erase("d");
+  EXPECT_FALSE(ComparePoses(two, two));
+  EXPECT_FALSE(ComparePoses({}, SquareOfCameras()));
+
+  Poses line;
+  for (int i = 0; i < 5; ++i) {
+    line["view" + std::to_string(i)] =
+        AtCentre(Eigen::Quaterniond::Identity(), Eigen::Vector3d(i, 2.0 * i, 0.0));
+  }
+  EXPECT_FALSE(ComparePoses(line, line));
+}
+
+}  // namespace
+}  // namespace vgtw
