@@ -3,7 +3,9 @@
 
 #include "scene/reconstruction.h"
 
+#include <cstddef>
 #include <functional>
+#include <set>
 #include <string>
 
 namespace vgtw {
@@ -15,45 +17,38 @@ struct BundleAdjustmentOptions {
   // Residual (pixels) at which the loss departs from the square; > 0.
   double loss_scale_px = 1.0;
   bool refine_poses = true;
+  std::set<ImageId> fixed_images;  // images whose pose is held; they still observe points
   bool refine_focal_length = true;
   bool refine_principal_point = false;
   bool refine_extra_params = false;
   int max_num_iterations = 50;
   int num_threads = 0;  // 0 = all cores
-  // Called after each iteration with (iteration, cost); returning false stops and keeps the best.
+  // Called with (iteration, cost) at the start and after each iteration; returning false stops and
+  // keeps the best.
   std::function<bool(int, double)> on_iteration;
 
   void Check() const;
 };
 
 struct BundleAdjustmentSummary {
-  bool success = false;  // the solution is usable
-  std::string message;   // the solver's word
-  size_t num_residuals = 0;
-  double initial_cost = 0.0;  // robust cost
+  bool success = false;       // the solution is usable and was written to the reconstruction
+  std::string message;        // the solver's word, or why nothing was done
+  size_t num_residuals = 0;   // two per observation
+  double initial_cost = 0.0;  // half the sum of the robust losses, pixels^2
   double final_cost = 0.0;
   int num_iterations = 0;
   std::string gauge;  // which images fix the gauge, in words
 };
 
-// Minimises  sum rho(|project(camera, cam_from_world * X) - point2D|^2)  over the static points,
-// poses and intrinsics. Gauge: the pose of one image and one coordinate of the centre of the image
-// farthest from it are held (7 degrees of freedom). Observations behind a camera take no part.
-// If the solver fails, or the cost grows, the reconstruction is left as it was.
+// Minimises  sum rho(|project(camera, cam_from_world * X) - point2D|^2)  over the points, poses and
+// intrinsics. Observations that are behind their camera at the start, and points that fewer than
+// two images then observe, take no part; images with fewer than 3 observations keep their pose.
+// Gauge, per group of images linked by common points: the pose of one image and one coordinate of
+// the translation of the image farthest from it (7 degrees of freedom), see refine/gauge.h.
+// Afterwards frames and point errors are up to date. If there is nothing to adjust, the solver
+// fails, or the cost grows, the reconstruction is left as it was.
+// Throws std::invalid_argument if the reconstruction breaks its law.
 BundleAdjustmentSummary AdjustBundle(const BundleAdjustmentOptions& options,
                                      Reconstruction& reconstruction);
-
-struct FilterOptions {
-  double max_reprojection_error_px = 4.0;  // > 0
-  double min_triangulation_angle_deg = 1.5;
-};
-struct FilterSummary {
-  size_t num_removed_observations = 0;
-  size_t num_removed_points3D = 0;
-};
-
-// Removes observations that are behind their camera or reproject worse than the limit, and points
-// that keep fewer than two observations or no pair of rays at the minimum angle.
-FilterSummary FilterObservations(const FilterOptions& options, Reconstruction& reconstruction);
 
 }  // namespace vgtw

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "refine/bundle_adjustment.h"
+
+#include "refine/bundle_problem.h"
+#include "scene/error.h"
+#include "scene/reprojection.h"
+
+#include <algorithm>
+#include <string>
+
+namespace vgtw {
+
+void BundleAdjustmentOptions::Check() const {
+  VGTW_CHECK(loss_scale_px > 0.0,
+             "BundleAdjustmentOptions::loss_scale_px = " + std::to_string(loss_scale_px) +
+                 ", must be > 0");
+  VGTW_CHECK(max_num_iterations >= 0,
+             "BundleAdjustmentOptions::max_num_iterations = " + std::to_string(max_num_iterations) +
+                 ", must be >= 0");
+}
+
+BundleAdjustmentSummary AdjustBundle(const BundleAdjustmentOptions& options,
+                                     Reconstruction& reconstruction) {
+  options.Check();
+  const std::string fault = FindFault(reconstruction);
+  VGTW_CHECK(fault.empty(), fault);
+
+  BundleAdjustmentSummary summary;
+  const BundleParticipants participants = FindBundleParticipants(reconstruction);
+  if (participants.point3D_ids.empty()) {
+    summary.message = "no point is observed by two images";
+    return summary;
+  }
+  BundleProblem problem(options, reconstruction, participants);
+  const ceres::Solver::Summary solved = problem.Solve();
+  summary.message = solved.message;
+  summary.num_residuals = static_cast<size_t>(problem.num_residuals());
+  summary.initial_cost = solved.initial_cost;
+  summary.final_cost = solved.final_cost;
+  summary.num_iterations = std::max(0, static_cast<int>(solved.iterations.size()) - 1);
+  summary.gauge = problem.gauge().description;
+  if (!solved.IsSolutionUsable() || !(solved.final_cost <= solved.initial_cost)) return summary;
+
+  if (!problem.IsPossible()) {
+    summary.message = "the solution is not a possible reconstruction (" + solved.message + ")";
+    return summary;
+  }
+  problem.WriteTo(reconstruction);
+  UpdateFrames(reconstruction);
+  UpdatePointErrors(reconstruction);
+  summary.success = true;
+  return summary;
+}
+
+}  // namespace vgtw
