@@ -9,12 +9,12 @@
 namespace vgtw {
 
 // A row-major [height,width] array. Element (x, y) covers the pixel whose centre is
-// (x + 0.5, y + 0.5).
+// (x + 0.5, y + 0.5). Elements without a value are zero, also Eigen's, which T{} leaves unset.
 template <typename T>
 class Grid {
  public:
   Grid() = default;
-  Grid(int width, int height, T value = T{})
+  Grid(int width, int height, T value = Zero())
       : width_(width), height_(height), data_(CheckedSize(width, height), value) {}
 
   int width() const { return width_; }
@@ -32,6 +32,13 @@ class Grid {
   bool operator==(const Grid&) const = default;
 
  private:
+  static T Zero() {
+    if constexpr (requires { T::Zero(); }) {
+      return T::Zero();
+    } else {
+      return T{};
+    }
+  }
   static size_t CheckedSize(int width, int height) {
     VGTW_CHECK(width >= 0 && height >= 0, "grid size is negative");
     return static_cast<size_t>(width) * static_cast<size_t>(height);

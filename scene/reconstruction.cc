@@ -113,6 +113,13 @@ bool HasSensor(const Rig& rig, const SensorId& sensor) {
   return sensor == rig.reference || rig.sensor_from_rig.contains(sensor);
 }
 
+// The image of that id or nullptr; frames give ids in 64 bits.
+const Image* FindImage(const Reconstruction& reconstruction, uint64_t image_id) {
+  if (image_id > std::numeric_limits<ImageId>::max()) return nullptr;
+  const auto image = reconstruction.images.find(static_cast<ImageId>(image_id));
+  return image == reconstruction.images.end() ? nullptr : &image->second;
+}
+
 // Adds the images of one frame to `covered`.
 std::string FindFaultOfFrame(const Reconstruction& reconstruction,
                              const Frame& frame,
@@ -124,11 +131,10 @@ std::string FindFaultOfFrame(const Reconstruction& reconstruction,
     if (!HasSensor(rig->second, data.sensor)) return "names a sensor that its rig lacks";
     if (data.sensor.type != kCameraSensor) continue;
     const std::string image_name = Naming("image", data.data_id);
-    if (data.data_id > std::numeric_limits<ImageId>::max()) return "names " + image_name;
-    const auto image = reconstruction.images.find(static_cast<ImageId>(data.data_id));
-    if (image == reconstruction.images.end()) return "names the missing " + image_name;
-    if (image->second.camera_id != data.sensor.id) return image_name + " has another camera";
-    if (!covered.insert(image->first).second) return image_name + " belongs to two frames";
+    const Image* image = FindImage(reconstruction, data.data_id);
+    if (image == nullptr) return "names the missing " + image_name;
+    if (image->camera_id != data.sensor.id) return image_name + " has another camera";
+    if (!covered.insert(image->image_id).second) return image_name + " belongs to two frames";
   }
   return {};
 }
@@ -151,8 +157,7 @@ std::string FindFaultOfFrames(const Reconstruction& reconstruction) {
 // The image that a frame of a single camera holds, or nullptr.
 const Image* OnlyImage(const Reconstruction& reconstruction, const Frame& frame) {
   if (frame.data.size() != 1 || frame.data.front().sensor.type != kCameraSensor) return nullptr;
-  const auto image = reconstruction.images.find(static_cast<ImageId>(frame.data.front().data_id));
-  return image == reconstruction.images.end() ? nullptr : &image->second;
+  return FindImage(reconstruction, frame.data.front().data_id);
 }
 
 Point3D& FindPoint3D(Reconstruction& reconstruction, Point3DId point3D_id) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene/grid.h"
 
-#include <cstdint>
 #include <stdexcept>
 
+#include <Eigen/Core>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,6 +15,11 @@ TEST(Grid, IsRowMajor) {
   grid(2, 0) = 1;
   grid(0, 1) = 2;
   EXPECT_THAT(grid.data(), testing::ElementsAre(7, 7, 1, 2, 7, 7));
+}
+
+TEST(Grid, StartsAtZeroAlsoForVectors) {
+  EXPECT_THAT(Grid<float>(2, 2).data(), testing::Each(0.0f));
+  EXPECT_THAT(Grid<Eigen::Vector3f>(2, 2).data(), testing::Each(Eigen::Vector3f(0, 0, 0)));
 }
 
 TEST(Grid, ContainsItsPixelsOnly) {
