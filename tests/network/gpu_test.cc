@@ -12,7 +12,7 @@ TEST(ListGpus, AsksTheDriverForNameAndMemory) {
   const std::vector<Gpu> gpus = ListGpus(VGTW_FAKE_CUDA_DRIVER);
   ASSERT_EQ(gpus.size(), 1u);  // the second device refuses to answer
   EXPECT_EQ(gpus[0].name, "Fake 9000");
-  EXPECT_EQ(gpus[0].memory_bytes, 6u * 1024 * 1024 * 1024);
+  EXPECT_EQ(gpus[0].memory_bytes, uint64_t{6} << 30);
 }
 
 TEST(ListGpus, IsEmptyWhereTheDriverCannotStart) {
