@@ -235,6 +235,10 @@ void WriteSeedCameras(const PredictionReader& predictions,
            "give the photos that were predicted from");
     }
     views.push_back(view);
+    Camera& camera = views.back().camera;
+    const bool is_pinhole =
+        camera.model == CameraModel::kSimplePinhole || camera.model == CameraModel::kPinhole;
+    if (options.camera_model && is_pinhole) camera = PinholeInModel(camera, *options.camera_model);
   }
   if (views.empty()) {
     Fail(image_folder,

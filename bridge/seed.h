@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,9 @@ namespace vgtw {
 struct SeedOptions {
   // One camera for all images of the same size and camera model: the median of each parameter.
   bool shared_camera = false;
+  // Model of new cameras whose prediction is a pinhole, so that refinement can find the lens'
+  // distortion (see PinholeInModel); nullopt = as predicted.
+  std::optional<CameraModel> camera_model;
   // 3D points from confident static depth; without them the model has poses only.
   bool with_points = true;
   // Share of depth pixels kept, by confidence pooled over all views, in percent, (0, 100]. Taken

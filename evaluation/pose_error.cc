@@ -28,16 +28,25 @@ double AngleBetweenDirectionsDeg(const Eigen::Vector3d& a, const Eigen::Vector3d
   return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / std::numbers::pi;
 }
 
+// Fills relative_rotation_deg of every view; returns the median over all pairs.
 double MedianRelativeRotationDeg(const std::vector<Rigid3d>& estimate,
-                                 const std::vector<Rigid3d>& reference) {
+                                 const std::vector<Rigid3d>& reference,
+                                 std::vector<ViewPoseError>& views) {
   std::vector<double> errors_deg;
   errors_deg.reserve(estimate.size() * (estimate.size() - 1) / 2);
+  std::vector<std::vector<double>> errors_deg_by_view(views.size());
   for (size_t i = 0; i < estimate.size(); ++i) {
     for (size_t j = i + 1; j < estimate.size(); ++j) {
-      errors_deg.push_back(
+      const double error_deg =
           AngleBetweenDeg(estimate[j].rotation * estimate[i].rotation.conjugate(),
-                          reference[j].rotation * reference[i].rotation.conjugate()));
+                          reference[j].rotation * reference[i].rotation.conjugate());
+      errors_deg.push_back(error_deg);
+      errors_deg_by_view[i].push_back(error_deg);
+      errors_deg_by_view[j].push_back(error_deg);
     }
+  }
+  for (size_t i = 0; i < views.size(); ++i) {
+    views[i].relative_rotation_deg = Median(std::move(errors_deg_by_view[i]));
   }
   return Median(std::move(errors_deg));
 }
@@ -81,7 +90,7 @@ std::optional<PoseComparison> ComparePoses(const std::map<std::string, Rigid3d>&
       ++comparison.num_missing;
       continue;
     }
-    comparison.views.push_back({name, 0.0, 0.0});
+    comparison.views.push_back({.name = name});
     estimated.push_back(found->second);
     expected.push_back(cam_from_reference);
   }
@@ -109,7 +118,8 @@ std::optional<PoseComparison> ComparePoses(const std::map<std::string, Rigid3d>&
   comparison.centre_rmse_percent = 100.0 * comparison.centre_rmse / comparison.extent;
   comparison.rotation_mean_deg /= num_views;
   comparison.rotation_median_deg = Median(std::move(rotations_deg));
-  comparison.relative_rotation_median_deg = MedianRelativeRotationDeg(estimated, expected);
+  comparison.relative_rotation_median_deg =
+      MedianRelativeRotationDeg(estimated, expected, comparison.views);
   comparison.relative_direction_median_deg = MedianRelativeDirectionDeg(
       estimated, expected, Diameter(estimated_centres), comparison.extent);
   return comparison;

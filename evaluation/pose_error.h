@@ -15,6 +15,9 @@ struct ViewPoseError {
   std::string name;
   double rotation_deg = 0.0;  // of cam_from_world, after alignment
   double centre = 0.0;        // distance after alignment, scene units of the reference
+  // Median error of the rotations from this view to the others: alignment-free, so that it stays
+  // small where close or collinear centres leave the alignment's rotation to noise.
+  double relative_rotation_deg = 0.0;
 };
 
 // Poses of an estimate against a reference, Sim3-aligned on the camera centres (Umeyama over all

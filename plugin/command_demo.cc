@@ -55,7 +55,7 @@ struct DemoCommand {
       return error ? FormatNumber(error->centre_rmse_percent, 3) : "-";
     };
     const auto rotation = [](const std::optional<PoseComparison>& error) {
-      return error ? FormatNumber(error->rotation_mean_deg, 3) : "-";
+      return error ? FormatNumber(error->relative_rotation_median_deg, 3) : "-";
     };
     return FormatTable(
                {{"refined model", "without masks", "with masks"},
@@ -75,13 +75,15 @@ struct DemoCommand {
                 row("  of the feed-forward poses",
                     centre(without.report.feedforward_error),
                     centre(with.report.feedforward_error)),
-                row("rotation error, deg",
+                row("relative rotation error, deg",
                     rotation(without.report.refined_error),
                     rotation(with.report.refined_error)),
                 row("  of the feed-forward poses",
                     rotation(without.report.feedforward_error),
                     rotation(with.report.feedforward_error))}) +
-           "Pose errors against exact truth, Sim3-aligned on camera centres.\n" + NextCommands();
+           "Against exact truth: centres RMSE after Sim3 alignment, rotations median over "
+           "pairs.\n" +
+           NextCommands();
   }
 
   std::string NextCommands() const {

@@ -109,7 +109,7 @@ class Program {
     app_.set_version_flag("--version", std::string("vgtw ") + kVersion);
     app_.footer(
         "Start with 'vgtw doctor' (what is here) and 'vgtw demo' (all of it, on a made scene).");
-    app_.require_subcommand(1);
+    app_.require_subcommand(0, 1);
     for (const Command& command : commands) Add(command);
   }
 
@@ -125,8 +125,13 @@ class Program {
     } catch (const CLI::ParseError& error) {
       return ReportUsage(app_, error);
     }
+    // Asked for here and not by CLI11, which would not tell a misspelt command from none.
+    const auto work = works_.find(Innermost(&app_));
+    if (work == works_.end()) {
+      return ReportUsage(app_, CLI::RequiredError("A command"));
+    }
     try {
-      works_.at(Innermost(&app_))();
+      work->second();
       return 0;
     } catch (const Error& error) {
       return Fail(app_, error.what());
@@ -148,7 +153,7 @@ class Program {
       CLI::App*& group_app = groups_[group];
       if (group_app == nullptr) {
         group_app = app_.add_subcommand(group, "Tools for distractor masks");
-        group_app->require_subcommand(1);
+        group_app->require_subcommand(0, 1);
       }
       parent = group_app;
       name = name.substr(space + 1);
@@ -200,13 +205,14 @@ Flags& Flags::Add(std::string_view name, double* value, std::string_view help) {
 }
 
 Flags& Flags::Add(std::string_view name, bool* value, std::string_view help) {
-  // expected(0, 1) lets COLMAP users write "--overwrite 1" as well as "--overwrite".
+  // expected(0, 1) lets COLMAP users write "--overwrite 1" as well as "--overwrite"; without a
+  // value CLI11 takes default_str, so that the default for --help goes into option_text.
   impl_->app->add_option("--" + std::string(name), *value, std::string(help))
       ->group(impl_->group)
-      ->capture_default_str()
       ->expected(0, 1)
       ->take_last()
-      ->default_str(*value ? "1" : "0");
+      ->default_str("1")
+      ->option_text(*value ? "0|1 (default 1)" : "0|1 (default 0)");
   return *this;
 }
 

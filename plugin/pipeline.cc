@@ -148,6 +148,7 @@ void Pipeline::ExtractFeatures() {
       ColmapDatabase database = ColmapDatabase::Create(database_path);
       SeedOptions seed;
       seed.shared_camera = options_.shared_camera;
+      seed.camera_model = options_.camera_model;
       WriteSeedCameras(predictions_, options_.image_path, seed, database);
     }
     ColmapOptions arguments = {
@@ -271,9 +272,10 @@ void Pipeline::Refine() {
     return AsJson(*refined);
   });
   for (const json& name : result["held_views"]) {
-    notes_.push_back(name.get<std::string>() + " has fewer than " +
-                     std::to_string(options_.min_num_observations) +
-                     " observations and keeps its feed-forward pose");
+    notes_.push_back(
+        name.get<std::string>() + " has fewer than " +
+        std::to_string(options_.min_num_observations) +
+        " observations of points that three photos see and keeps its feed-forward pose");
   }
 }
 

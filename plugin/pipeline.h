@@ -31,10 +31,12 @@ struct PipelineOptions {
   int max_num_features = 8192;  // per image
   int max_image_size = 3200;    // pixels; larger images are reduced for extraction
   bool use_gpu = false;         // for colmap's SIFT
+  // For photos that were predicted as pinholes; refinement then finds the lens' distortion.
+  CameraModel camera_model = CameraModel::kSimpleRadial;
   bool shared_camera = false;
-  bool refine_extra_params = false;  // distortion, where the camera model has it
+  bool refine_extra_params = true;  // distortion, where the camera model has it
   int num_refine_rounds = 3;
-  // A view with fewer triangulated observations than this keeps its feed-forward pose.
+  // A view with fewer observations of points that three views see keeps its feed-forward pose.
   int min_num_observations = 15;
 
   int num_threads = 0;
@@ -49,7 +51,8 @@ struct ViewReport {
   size_t num_excluded_keypoints = 0;  // that lie in excluded pixels; 0 if masking worked
   double excluded_share = 0.0;
   size_t num_observations = 0;       // in the refined model
-  double rotation_change_deg = 0.0;  // refined against feed-forward, Sim3-aligned
+  size_t num_supporting = 0;         // of these, of points that three views see
+  double rotation_change_deg = 0.0;  // refined against feed-forward, relative to the others
   bool is_refined = false;           // else it kept its feed-forward pose
 };
 

@@ -33,11 +33,8 @@ double PixelsOfAngle(const Reconstruction& model, double angle_deg) {
 
 std::set<ImageId> WeakImages(const Reconstruction& model, int min_num_observations) {
   std::set<ImageId> weak;
-  for (const auto& [id, image] : model.images) {
-    const auto num = std::count_if(image.points2D.begin(),
-                                   image.points2D.end(),
-                                   [](const Point2D& point2D) { return point2D.HasPoint3D(); });
-    if (num < min_num_observations) weak.insert(id);
+  for (const auto& [id, num] : NumSupportingObservations(model)) {
+    if (num < static_cast<size_t>(min_num_observations)) weak.insert(id);
   }
   return weak;
 }
@@ -52,11 +49,12 @@ Reconstruction WithoutPoints(const Reconstruction& model) {
 
 // One robust adjustment at the scale of the model's own error, then a filter.
 BundleAdjustmentSummary AdjustAndFilter(const RefineRoundsOptions& options,
+                                        bool refine_extra_params,
                                         double max_error_px,
                                         Reconstruction& model) {
   BundleAdjustmentOptions adjustment;
   adjustment.loss_scale_px = std::max(1.0, ComputeReprojectionStats(model).median_px);
-  adjustment.refine_extra_params = options.refine_extra_params;
+  adjustment.refine_extra_params = refine_extra_params;
   adjustment.num_threads = options.num_threads;
   adjustment.fixed_images = WeakImages(model, options.min_num_observations);
   const BundleAdjustmentSummary summary = AdjustBundle(adjustment, model);
@@ -67,6 +65,17 @@ BundleAdjustmentSummary AdjustAndFilter(const RefineRoundsOptions& options,
 }
 
 }  // namespace
+
+std::map<ImageId, size_t> NumSupportingObservations(const Reconstruction& model) {
+  const size_t min_track_length = model.images.size() < 3 ? 2 : 3;
+  std::map<ImageId, size_t> num_by_image;
+  for (const auto& [id, image] : model.images) num_by_image[id] = 0;
+  for (const auto& [id, point3D] : model.points3D) {
+    if (point3D.track.size() < min_track_length) continue;
+    for (const TrackElement& element : point3D.track) ++num_by_image[element.image_id];
+  }
+  return num_by_image;
+}
 
 std::optional<Reconstruction> Triangulate(const Colmap& colmap,
                                           const TriangulationInput& input,
@@ -124,11 +133,13 @@ std::optional<RefineRoundsResult> RefineInRounds(const Colmap& colmap,
     if (round == 0) result.feedforward = *model;
     const bool is_last = round + 1 == options.num_rounds;
     // Twice: the first pass finds the poses, the second sharpens them without what it dropped.
-    AdjustAndFilter(options, is_last ? kFinalMaxErrorPx : max_error_px, *model);
+    // Distortion is released once poses are near: before that it would soak up their errors.
+    const bool releases_lens = options.refine_extra_params && round > 0;
+    AdjustAndFilter(options, releases_lens, is_last ? kFinalMaxErrorPx : max_error_px, *model);
     const double median_px = ComputeReprojectionStats(*model).median_px;
     max_error_px = std::clamp(6.0 * median_px, kFinalMaxErrorPx, max_error_px);
-    result.rounds.push_back(
-        AdjustAndFilter(options, is_last ? kFinalMaxErrorPx : max_error_px, *model));
+    result.rounds.push_back(AdjustAndFilter(
+        options, options.refine_extra_params, is_last ? kFinalMaxErrorPx : max_error_px, *model));
     result.refined = std::move(*model);
     display.Callback()(round + 1, options.num_rounds);
   }

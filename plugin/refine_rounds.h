@@ -6,6 +6,7 @@
 #include "scene/reconstruction.h"
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,11 +29,15 @@ std::optional<Reconstruction> Triangulate(const Colmap& colmap,
                                           const Reconstruction& seed,
                                           double max_error_px);
 
+// Observations of each image that tie its pose and scale down: those of points that three images
+// see. A chain of points seen by two leaves the scale of each link free. (Of two images: all.)
+std::map<ImageId, size_t> NumSupportingObservations(const Reconstruction& model);
+
 struct RefineRoundsOptions {
   int num_rounds = 3;  // >= 1
-  // Views with fewer observations are held at their pose.
+  // Views with fewer supporting observations are held at their pose.
   int min_num_observations = 15;
-  bool refine_extra_params = false;
+  bool refine_extra_params = true;  // distortion, where the camera's model has it
   int num_threads = 0;
 };
 

@@ -34,9 +34,11 @@ std::vector<ViewReport> ReportViews(const Workspace& workspace,
   std::map<std::string, double> change_deg_by_name;
   if (const auto change =
           ComparePoses(CamFromWorldByName(refined), CamFromWorldByName(feedforward))) {
-    for (const auto& view : change->views) change_deg_by_name[view.name] = view.rotation_deg;
+    for (const auto& view : change->views)
+      change_deg_by_name[view.name] = view.relative_rotation_deg;
   }
   const json stages = workspace.record().value("stages", json::object());
+  const std::map<ImageId, size_t> supporting = NumSupportingObservations(refined);
   std::vector<ViewReport> views;
   for (const auto& [id, image] : refined.images) {
     ViewReport view;
@@ -50,7 +52,8 @@ std::vector<ViewReport> ReportViews(const Workspace& workspace,
     }
     view.num_observations = NumObservations(image);
     view.rotation_change_deg = change_deg_by_name[image.name];
-    view.is_refined = view.num_observations >= static_cast<size_t>(options.min_num_observations);
+    view.num_supporting = supporting.at(id);
+    view.is_refined = view.num_supporting >= static_cast<size_t>(options.min_num_observations);
     views.push_back(view);
   }
   std::sort(views.begin(), views.end(), [](const ViewReport& a, const ViewReport& b) {
@@ -61,9 +64,10 @@ std::vector<ViewReport> ReportViews(const Workspace& workspace,
 
 std::string PoseLine(const char* label, const PoseComparison& error) {
   return std::string(label) + ": centres " + FormatNumber(error.centre_rmse_percent, 3) +
-         " % of extent (RMSE), rotations " + FormatNumber(error.rotation_mean_deg, 3) +
-         " deg (mean), relative rotations " + FormatNumber(error.relative_rotation_median_deg, 3) +
-         " deg (median of pairs); Sim3-aligned on centres, " + std::to_string(error.views.size()) +
+         " % of extent (RMSE, Sim3-aligned), rotations " +
+         FormatNumber(error.relative_rotation_median_deg, 3) + " deg, directions " +
+         FormatNumber(error.relative_direction_median_deg, 3) +
+         " deg (medians over pairs, not aligned), " + std::to_string(error.views.size()) +
          " views\n";
 }
 
@@ -92,6 +96,7 @@ json OptionsAsJson(const PipelineOptions& options) {
            {{"max_num_features", options.max_num_features},
             {"max_image_size", options.max_image_size},
             {"use_gpu", options.use_gpu},
+            {"camera_model", GetCameraModelInfo(options.camera_model).name},
             {"shared_camera", options.shared_camera}}},
           {"matches",
            {{"matcher", options.matcher == Matcher::kExhaustive ? "exhaustive" : "sequential"},
@@ -116,8 +121,10 @@ json AsJson(const ReprojectionStats& stats) {
 json AsJson(const PoseComparison& comparison) {
   json views = json::array();
   for (const ViewPoseError& view : comparison.views) {
-    views.push_back(
-        {{"name", view.name}, {"rotation_deg", view.rotation_deg}, {"centre", view.centre}});
+    views.push_back({{"name", view.name},
+                     {"rotation_deg", view.rotation_deg},
+                     {"relative_rotation_deg", view.relative_rotation_deg},
+                     {"centre", view.centre}});
   }
   return {{"alignment", "Sim3 on camera centres"},
           {"num_missing", comparison.num_missing},
@@ -153,6 +160,7 @@ json AsJson(const PipelineReport& report) {
                      {"num_excluded_keypoints", view.num_excluded_keypoints},
                      {"excluded_share", view.excluded_share},
                      {"num_observations", view.num_observations},
+                     {"num_supporting_observations", view.num_supporting},
                      {"rotation_change_deg", view.rotation_change_deg},
                      {"status", view.is_refined ? "refined" : "kept feed-forward pose"}});
   }
@@ -197,14 +205,21 @@ PipelineReport MakeReport(const Workspace& workspace, const PipelineOptions& opt
 }
 
 std::string FormatReport(const PipelineReport& report) {
-  std::vector<std::vector<std::string>> views = {
-      {"photo", "excluded %", "keypoints", "in mask", "observations", "turned deg", "status"}};
+  std::vector<std::vector<std::string>> views = {{"photo",
+                                                  "excluded %",
+                                                  "keypoints",
+                                                  "in mask",
+                                                  "observations",
+                                                  "supporting",
+                                                  "turned deg",
+                                                  "status"}};
   for (const ViewReport& view : report.views) {
     views.push_back({view.name,
                      FormatNumber(100.0 * view.excluded_share, 1),
                      std::to_string(view.num_keypoints),
                      std::to_string(view.num_excluded_keypoints),
                      std::to_string(view.num_observations),
+                     std::to_string(view.num_supporting),
                      FormatNumber(view.rotation_change_deg, 3),
                      view.is_refined ? "refined" : "kept"});
   }

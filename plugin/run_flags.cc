@@ -13,12 +13,19 @@ void RunFlags::Declare(Flags& flags) {
       .Add("max_image_size", &options_.max_image_size, "Larger photos are reduced, pixels")
       .Add("use_gpu", &options_.use_gpu, "Let colmap use its GPU code");
   flags.Group("Refinement")
+      .AddChoice("camera_model",
+                 &camera_model_,
+                 {"SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"},
+                 "Lens of photos that were predicted as pinholes")
       .Add("shared_camera", &options_.shared_camera, "One camera for all photos of a size")
-      .Add("refine_extra_params", &options_.refine_extra_params, "Also refine lens distortion")
+      .Add("refine_extra_params",
+           &options_.refine_extra_params,
+           "Refine lens distortion, where the model has it")
       .Add("num_rounds", &options_.num_refine_rounds, "Triangulate and adjust this often")
       .Add("min_num_observations",
            &options_.min_num_observations,
-           "A photo with fewer observations keeps its feed-forward pose");
+           "A photo with fewer observations of points that three photos see keeps its "
+           "feed-forward pose");
 }
 
 void RunFlags::ApplyTo(PipelineOptions& options) const {
@@ -29,6 +36,7 @@ void RunFlags::ApplyTo(PipelineOptions& options) const {
   options.max_num_features = options_.max_num_features;
   options.max_image_size = options_.max_image_size;
   options.use_gpu = options_.use_gpu;
+  options.camera_model = *FindCameraModel(camera_model_);
   options.shared_camera = options_.shared_camera;
   options.refine_extra_params = options_.refine_extra_params;
   options.num_refine_rounds = options_.num_refine_rounds;

@@ -20,6 +20,7 @@ class RunFlags {
   MaskFlags mask_;
   PipelineOptions options_;
   std::string matcher_ = "exhaustive";
+  std::string camera_model_ = "SIMPLE_RADIAL";
 };
 
 }  // namespace vgtw

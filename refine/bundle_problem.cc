@@ -12,6 +12,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <glog/logging.h>
 
 namespace vgtw {
 namespace {
@@ -134,6 +135,18 @@ ceres::Problem::Options WithoutLossOwnership() {
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   return options;
 }
+
+// Ceres also tells glog, which writes to stderr, of every failed step; its summary says enough.
+class QuietLog {
+ public:
+  QuietLog() { FLAGS_minloglevel = google::FATAL; }
+  ~QuietLog() { FLAGS_minloglevel = saved_level_; }
+  QuietLog(const QuietLog&) = delete;
+  QuietLog& operator=(const QuietLog&) = delete;
+
+ private:
+  const int saved_level_ = FLAGS_minloglevel;
+};
 
 }  // namespace
 
@@ -269,6 +282,7 @@ std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::PointsFirst() {
 }
 
 ceres::Solver::Summary BundleProblem::Solve() {
+  const QuietLog quiet;
   ceres::Solver::Options options;
   options.linear_solver_type =
       participants_.image_ids.size() <= kMaxDenseImages ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;

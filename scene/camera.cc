@@ -148,6 +148,20 @@ std::string FindFault(const Camera& camera) {
   return {};
 }
 
+Camera PinholeInModel(const Camera& camera, CameraModel model) {
+  VGTW_CHECK(camera.model == CameraModel::kSimplePinhole || camera.model == CameraModel::kPinhole,
+             "the camera has a distortion");
+  // Beyond these, zero coefficients are another projection than the pinhole's.
+  VGTW_CHECK(model <= CameraModel::kOpenCV || model == CameraModel::kFullOpenCV,
+             "not a model of the pinhole family");
+  Camera converted = camera;
+  converted.model = model;
+  converted.params.assign(static_cast<size_t>(GetCameraModelInfo(model).num_params), 0.0);
+  converted.SetFocalLength(camera.FocalLengthX(), camera.FocalLengthY());
+  converted.SetPrincipalPoint(camera.PrincipalPoint());
+  return converted;
+}
+
 Camera Rescale(const Camera& camera, uint64_t width, uint64_t height) {
   VGTW_CHECK(camera.width > 0 && camera.height > 0, "the camera has no size");
   VGTW_CHECK(width > 0 && height > 0, "the new size is empty");

@@ -74,6 +74,11 @@ std::optional<Eigen::Vector2d> Project(const Camera& camera, const Eigen::Vector
 // invertible around the pixel; nullopt where the iteration does not converge.
 std::optional<Eigen::Vector2d> Unproject(const Camera& camera, const Eigen::Vector2d& pixel);
 
+// The same lens in another model of the pinhole family (SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL,
+// RADIAL, OPENCV, FULL_OPENCV), its distortion zero; two focal lengths become their mean where the
+// model has one. `camera` must be SIMPLE_PINHOLE or PINHOLE, else std::invalid_argument.
+Camera PinholeInModel(const Camera& camera, CameraModel model);
+
 // Intrinsics after the image is resized to width x height. Law: where a point projects to (x, y)
 // before, it projects to (x, y) * new size / old size after. Where that needs two focal lengths, a
 // model with one becomes the model that holds it as a special case: SIMPLE_PINHOLE becomes PINHOLE,

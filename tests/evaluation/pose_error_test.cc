@@ -165,5 +165,19 @@ TEST(ComparePoses, IsUndeterminedForTwoViewsAndForCollinearCentres) {
   EXPECT_FALSE(ComparePoses(line, line));
 }
 
+TEST(ComparePoses, TurningOneViewShowsInItsRelativeRotationOnly) {
+  const Poses reference = RandomPoses(7, 3);
+  Poses estimate = reference;
+  Rigid3d& turned = estimate["view2"];
+  turned = AtCentre(RotationAboutAxis(Eigen::Vector3d::UnitX(), 5.0) * turned.rotation,
+                    OriginInSource(turned));
+  const auto comparison = ComparePoses(estimate, reference);
+  ASSERT_TRUE(comparison);
+  for (const ViewPoseError& view : comparison->views) {
+    // Every other view has one bad pair of six: the median does not see it.
+    EXPECT_NEAR(view.relative_rotation_deg, view.name == "view2" ? 5.0 : 0.0, 1e-9) << view.name;
+  }
+}
+
 }  // namespace
 }  // namespace vgtw

@@ -26,7 +26,7 @@ struct Values {
   bool was_run = false;
 };
 
-Outcome Run(std::vector<std::string> words, Values& values, std::function<void()> work = {}) {
+Outcome RunWith(std::vector<std::string> words, Values& values, std::function<void()> work = {}) {
   const DeclareCommand declare = [&](Flags& flags) {
     flags.Group("Input")
         .Require("input_path", &values.input_path, "What to read")
@@ -56,9 +56,9 @@ Outcome Run(std::vector<std::string> words, Values& values, std::function<void()
 
 TEST(Flags, SetValuesAndRunTheCommand) {
   Values values;
-  const Outcome outcome =
-      Run({"mask", "apply", "--input_path", "a b", "--count", "7", "--share=0.25", "--overwrite"},
-          values);
+  const Outcome outcome = RunWith(
+      {"mask", "apply", "--input_path", "a b", "--count", "7", "--share=0.25", "--overwrite"},
+      values);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.stderr_text;
   EXPECT_TRUE(values.was_run);
   EXPECT_EQ(values.input_path, "a b");
@@ -70,29 +70,29 @@ TEST(Flags, SetValuesAndRunTheCommand) {
 TEST(Flags, SwitchesAlsoTakeColmapsZeroAndOne) {
   Values values;
   values.overwrite = true;
-  EXPECT_EQ(Run({"seed", "--input_path", "a", "--overwrite", "0"}, values).exit_code, 0);
+  EXPECT_EQ(RunWith({"seed", "--input_path", "a", "--overwrite", "0"}, values).exit_code, 0);
   EXPECT_FALSE(values.overwrite);
-  EXPECT_EQ(Run({"seed", "--overwrite", "1", "--input_path", "a"}, values).exit_code, 0);
+  EXPECT_EQ(RunWith({"seed", "--overwrite", "1", "--input_path", "a"}, values).exit_code, 0);
   EXPECT_TRUE(values.overwrite);
 }
 
 TEST(Flags, HelpShowsGroupsDefaultsAndExamples) {
   Values values;
-  const Outcome outcome = Run({"seed", "--help"}, values);
+  const Outcome outcome = RunWith({"seed", "--help"}, values);
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_FALSE(values.was_run);
   for (const char* text :
        {"Input", "Algorithm", "--count", "3", "0.5", "round", "REQUIRED", "vgtw seed x"}) {
     EXPECT_THAT(outcome.stdout_text, HasSubstr(text));
   }
-  EXPECT_THAT(Run({"--help"}, values).stdout_text, HasSubstr("vgtw doctor"));
+  EXPECT_THAT(RunWith({"--help"}, values).stdout_text, HasSubstr("vgtw doctor"));
 }
 
 TEST(Flags, WrongUsageExitsWithTwoInOneLine) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
-      {{}, "subcommand is required"},
+      {{}, "A command is required"},
       {{"sed"}, "did you mean 'seed'"},
-      {{"mask"}, "subcommand is required"},
+      {{"mask"}, "A command is required"},
       {{"mask", "aply"}, "did you mean 'apply'"},
       {{"seed"}, "--input_path is required"},
       {{"seed", "--input_path"}, "--input_path"},
@@ -103,7 +103,7 @@ TEST(Flags, WrongUsageExitsWithTwoInOneLine) {
       {{"seed", "--input_path", "a", "stray"}, "unknown argument 'stray'"}};
   for (const auto& [words, expected] : cases) {
     Values values;
-    const Outcome outcome = Run(words, values);
+    const Outcome outcome = RunWith(words, values);
     EXPECT_EQ(outcome.exit_code, 2) << expected;
     EXPECT_FALSE(values.was_run);
     EXPECT_THAT(outcome.stderr_text, HasSubstr(expected));
@@ -115,14 +115,14 @@ TEST(Flags, WrongUsageExitsWithTwoInOneLine) {
 TEST(Flags, FailuresExitWithOneAndNameTheCommand) {
   Values values;
   const auto fail = [] { throw Error("a.db: is not a database, expected one"); };
-  const Outcome outcome = Run({"mask", "apply", "--input_path", "a"}, values, fail);
+  const Outcome outcome = RunWith({"mask", "apply", "--input_path", "a"}, values, fail);
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_EQ(outcome.stderr_text, "vgtw mask apply: a.db: is not a database, expected one\n");
   const auto crash = [] { throw std::runtime_error("oops"); };
-  EXPECT_THAT(Run({"seed", "--input_path", "a"}, values, crash).stderr_text,
+  EXPECT_THAT(RunWith({"seed", "--input_path", "a"}, values, crash).stderr_text,
               HasSubstr("internal error: oops"));
   const auto bounds = [] { VGTW_CHECK(1 < 0, "SeedOptions::keep_percent = 0, must be > 0"); };
-  EXPECT_THAT(Run({"seed", "--input_path", "a"}, values, bounds).stderr_text,
+  EXPECT_THAT(RunWith({"seed", "--input_path", "a"}, values, bounds).stderr_text,
               HasSubstr("keep_percent"));
 }
 

@@ -197,6 +197,21 @@ TEST(Camera, RescaleKeepsTheModelUnlessStretched) {
   EXPECT_THAT(stretched.params, testing::ElementsAre(200, 100, 100, 40, 0.1, 0.01, 0, 0));
 }
 
+TEST(Camera, PinholeInAnotherModelProjectsTheSame) {
+  const Camera pinhole = MakePinhole(640, 480, 500.0, 500.0);
+  const Eigen::Vector3d point(0.3, -0.4, 1.5);
+  for (const char* name : {"SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"}) {
+    const Camera converted = PinholeInModel(pinhole, *FindCameraModel(name));
+    EXPECT_EQ(FindFault(converted), "") << name;
+    EXPECT_EQ(*Project(converted, point), *Project(pinhole, point)) << name;
+  }
+  EXPECT_EQ(PinholeInModel(MakePinhole(640, 480, 500.0, 502.0), CameraModel::kSimpleRadial).params,
+            (std::vector<double>{501.0, 320.0, 240.0, 0.0}));
+  EXPECT_THROW(PinholeInModel(pinhole, CameraModel::kOpenCVFisheye), std::invalid_argument);
+  EXPECT_THROW(PinholeInModel(PinholeInModel(pinhole, CameraModel::kRadial), CameraModel::kPinhole),
+               std::invalid_argument);
+}
+
 TEST(Camera, TableHoldsColmapsNamesAndSizes) {
   for (int model_id = 0; model_id < kNumCameraModels; ++model_id) {
     const CameraModelInfo& info = GetCameraModelInfo(static_cast<CameraModel>(model_id));
