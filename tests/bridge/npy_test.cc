@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/npy.h"
 
-#include "numpy_files.h"
 #include "scene/error.h"
+#include "tests/bridge/numpy_files.h"
 
 #include <algorithm>
 #include <cmath>
@@ -134,20 +134,21 @@ TEST(Npy, AbsurdShapesAreErrors) {
 TEST(Npy, OtherTypesAreNamed) {
   EXPECT_NE(MessageOf(NpyBytes("|O", "(1,)", "x")).find("'|O'"), std::string::npos);
   EXPECT_NE(MessageOf(NpyBytes(">f4", "(1,)", "xxxx")).find("'>f4'"), std::string::npos);
-  const std::string structured = NpyWithHeader(
-      "{'descr': [('x', '<f4')], 'fortran_order': False, 'shape': (1,), }", "xxxx");
+  const std::string structured =
+      NpyWithHeader("{'descr': [('x', '<f4')], 'fortran_order': False, 'shape': (1,), }", "xxxx");
   EXPECT_NE(MessageOf(structured).find("structured"), std::string::npos);
 }
 
 TEST(Npy, DamagedHeadersAreErrors) {
-  for (const char* header : {"",
-                             "{}",
-                             "{'descr': '<f4', 'fortran_order': False, }",
-                             "{'descr': '<f4', 'descr': '<f4', 'shape': (1,), }",
-                             "{'descr': '<f4', 'fortran_order': Maybe, 'shape': (1,), }",
-                             "{'descr': '<f4, 'fortran_order': False, 'shape': (1,), }",
-                             "{'descr': '<f4', 'fortran_order': False, 'shape': (1,), } x",
-                             "{'descr': '<f4', 'fortran_order': False, 'shape': (1,), 'more': 1}"}) {
+  for (const char* header :
+       {"",
+        "{}",
+        "{'descr': '<f4', 'fortran_order': False, }",
+        "{'descr': '<f4', 'descr': '<f4', 'shape': (1,), }",
+        "{'descr': '<f4', 'fortran_order': Maybe, 'shape': (1,), }",
+        "{'descr': '<f4, 'fortran_order': False, 'shape': (1,), }",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (1,), } x",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (1,), 'more': 1}"}) {
     EXPECT_NE(MessageOf(NpyWithHeader(header, "xxxx")), "") << header;
   }
   std::string version = NpyFloats("(1,)", {1});

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/npz.h"
 
-#include "numpy_files.h"
 #include "scene/error.h"
 #include "scene/files.h"
-#include "support/temporary_folder.h"
+#include "tests/bridge/numpy_files.h"
+#include "tests/support/temporary_folder.h"
 
 #include <gtest/gtest.h>
 

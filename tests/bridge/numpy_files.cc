@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "numpy_files.h"
+#include "tests/bridge/numpy_files.h"
 
 #include "scene/files.h"
 #include "scene/image_io.h"
@@ -30,8 +30,9 @@ std::string NpyBytes(const std::string& descr,
                      const std::string& values,
                      bool is_fortran_order,
                      int version) {
-  const std::string header = "{'descr': '" + descr + "', 'fortran_order': " +
-                             (is_fortran_order ? "True" : "False") + ", 'shape': " + shape + ", }";
+  const std::string header = "{'descr': '" + descr +
+                             "', 'fortran_order': " + (is_fortran_order ? "True" : "False") +
+                             ", 'shape': " + shape + ", }";
   return NpyWithHeader(header, values, version);
 }
 
