@@ -23,7 +23,4 @@ bool IsTruncated(std::span<const std::byte> file);
 // The APP1 payload of a JPEG that starts with "Exif\0\0", or an empty span.
 std::span<const std::byte> FindExif(std::span<const std::byte> file);
 
-// Focal length in pixels by the rule of ReadExifFocalLength, from such a payload.
-std::optional<double> ParseExifFocalLength(std::span<const std::byte> exif, const ImageSize& size);
-
 }  // namespace vgtw

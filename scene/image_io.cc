@@ -2,6 +2,7 @@
 #include "scene/image_io.h"
 
 #include "scene/error.h"
+#include "scene/exif_focal_length.h"
 #include "scene/files.h"
 #include "scene/image_header.h"
 
