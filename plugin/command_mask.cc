@@ -6,6 +6,7 @@
 #include "plugin/mask_flags.h"
 #include "plugin/progress.h"
 #include "plugin/table.h"
+#include "scene/error.h"
 
 #include <memory>
 
@@ -51,6 +52,9 @@ struct MaskApplyCommand {
 
   void Run() {
     Apply(usability);
+    if (output_path.empty() && !options.in_place) {
+      throw Error("no target, expected --output_path NEW.db or --in_place");
+    }
     options.num_threads = usability.num_threads;
     ProgressDisplay display("mask apply");
     const ApplyMasksSummary summary =

@@ -52,7 +52,11 @@ void AddUsability(Flags& flags, Usability& usability) {
       .Add("json", &usability.json_path, "Also write the result to this file as JSON");
 }
 
-void Apply(const Usability& usability) { SetProgressStyle(usability.progress); }
+void Apply(const Usability& usability) {
+  SetProgressStyle(usability.progress);
+  // Fail before the work, not after it.
+  if (!usability.json_path.empty()) AtomicFile{usability.json_path};
+}
 
 void Finish(const Usability& usability, const std::string& text, const nlohmann::json& result) {
   std::fputs(text.c_str(), stdout);

@@ -255,6 +255,7 @@ void Pipeline::Refine() {
     RefineRoundsOptions rounds;
     rounds.num_rounds = options_.num_refine_rounds;
     rounds.min_num_observations = options_.min_num_observations;
+    rounds.max_turn_deg = options_.max_turn_deg;
     rounds.refine_extra_params = options_.refine_extra_params;
     rounds.num_threads = options_.num_threads;
     const auto refined = RefineInRounds(colmap_, input, seed.reconstruction, rounds);
@@ -271,11 +272,8 @@ void Pipeline::Refine() {
     WriteModel(refined->refined, workspace_.refined(), write);
     return AsJson(*refined);
   });
-  for (const json& name : result["held_views"]) {
-    notes_.push_back(
-        name.get<std::string>() + " has fewer than " +
-        std::to_string(options_.min_num_observations) +
-        " observations of points that three photos see and keeps its feed-forward pose");
+  for (const auto& [name, reason] : result["held_views"].items()) {
+    notes_.push_back(name + " keeps its feed-forward pose: " + reason.get<std::string>());
   }
 }
 

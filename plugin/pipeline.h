@@ -38,6 +38,7 @@ struct PipelineOptions {
   int num_refine_rounds = 3;
   // A view with fewer observations of points that three views see keeps its feed-forward pose.
   int min_num_observations = 15;
+  double max_turn_deg = 5.0;  // so does one that refinement would turn farther
 
   int num_threads = 0;
   bool overwrite = false;

@@ -49,6 +49,7 @@ Reconstruction WithoutPoints(const Reconstruction& model) {
 
 // One robust adjustment at the scale of the model's own error, then a filter.
 BundleAdjustmentSummary AdjustAndFilter(const RefineRoundsOptions& options,
+                                        const std::set<ImageId>& held,
                                         bool refine_extra_params,
                                         double max_error_px,
                                         Reconstruction& model) {
@@ -57,11 +58,67 @@ BundleAdjustmentSummary AdjustAndFilter(const RefineRoundsOptions& options,
   adjustment.refine_extra_params = refine_extra_params;
   adjustment.num_threads = options.num_threads;
   adjustment.fixed_images = WeakImages(model, options.min_num_observations);
+  adjustment.fixed_images.insert(held.begin(), held.end());
   const BundleAdjustmentSummary summary = AdjustBundle(adjustment, model);
   FilterOptions filter;
   filter.max_reprojection_error_px = max_error_px;
   FilterObservations(filter, model);
   return summary;
+}
+
+// All rounds, from the first triangulation in result.feedforward to result.refined.
+void RunRounds(const Colmap& colmap,
+               const TriangulationInput& input,
+               const RefineRoundsOptions& options,
+               const std::set<ImageId>& held,
+               double seed_max_error_px,
+               RefineRoundsResult& result) {
+  ProgressDisplay display("refine");
+  double max_error_px = seed_max_error_px;
+  result.rounds.clear();
+  result.refined = result.feedforward;
+  for (int round = 0; round < options.num_rounds; ++round) {
+    Reconstruction model = result.refined;
+    if (round > 0) {
+      auto triangulated = Triangulate(colmap, input, model, max_error_px);
+      if (!triangulated) return;
+      model = std::move(*triangulated);
+    }
+    const bool is_last = round + 1 == options.num_rounds;
+    // Twice: the first pass finds the poses, the second sharpens them without what it dropped.
+    // Distortion is released once poses are near: before that it would soak up their errors.
+    const bool releases_lens = options.refine_extra_params && round > 0;
+    AdjustAndFilter(options, held, releases_lens, is_last ? kFinalMaxErrorPx : max_error_px, model);
+    const double median_px = ComputeReprojectionStats(model).median_px;
+    max_error_px = std::clamp(6.0 * median_px, kFinalMaxErrorPx, max_error_px);
+    result.rounds.push_back(AdjustAndFilter(options,
+                                            held,
+                                            options.refine_extra_params,
+                                            is_last ? kFinalMaxErrorPx : max_error_px,
+                                            model));
+    result.refined = std::move(model);
+    display.Callback()(round + 1, options.num_rounds);
+  }
+}
+
+// Why the outcome for an image cannot be kept; "" if it can.
+std::string FindReasonToHold(const RefineRoundsOptions& options,
+                             const Rigid3d& seed,
+                             const Rigid3d& refined,
+                             size_t num_supporting) {
+  if (num_supporting < static_cast<size_t>(options.min_num_observations)) {
+    return std::to_string(num_supporting) +
+           " observations of points that three photos see, at least " +
+           std::to_string(options.min_num_observations) + " are needed";
+  }
+  const double turn_deg = AngleBetweenDeg(seed.rotation, refined.rotation);
+  if (turn_deg <= options.max_turn_deg) return "";
+  return "refinement would turn it by " + FormatNumber(turn_deg, 1) + " deg, at most " +
+         FormatNumber(options.max_turn_deg, 1) + " are believed";
+}
+
+bool HasMoved(const Rigid3d& a, const Rigid3d& b) {
+  return a.translation != b.translation || a.rotation.coeffs() != b.rotation.coeffs();
 }
 
 }  // namespace
@@ -118,33 +175,29 @@ std::optional<RefineRoundsResult> RefineInRounds(const Colmap& colmap,
                                                  const Reconstruction& seed,
                                                  const RefineRoundsOptions& options) {
   VGTW_CHECK(options.num_rounds >= 1, "rounds of refinement");
-  const double seed_max_error_px =
-      std::max(kFinalMaxErrorPx, PixelsOfAngle(seed, kSeedMaxErrorDeg));
-  double max_error_px = seed_max_error_px;
+  VGTW_CHECK(options.max_turn_deg > 0.0, "RefineRoundsOptions::max_turn_deg");
+  const double max_error_px = std::max(kFinalMaxErrorPx, PixelsOfAngle(seed, kSeedMaxErrorDeg));
+  auto triangulated = Triangulate(colmap, input, seed, max_error_px);
+  if (!triangulated) return std::nullopt;
   RefineRoundsResult result;
-  ProgressDisplay display("refine");
-  for (int round = 0; round < options.num_rounds; ++round) {
-    const Reconstruction& poses = round == 0 ? seed : result.refined;
-    std::optional<Reconstruction> model = Triangulate(colmap, input, poses, max_error_px);
-    if (!model) {
-      if (round == 0) return std::nullopt;
-      break;
+  result.feedforward = std::move(*triangulated);
+  std::map<ImageId, std::string> reasons;
+  std::set<ImageId> held;
+  for (bool must_repeat = true; must_repeat;) {
+    RunRounds(colmap, input, options, held, max_error_px, result);
+    must_repeat = false;
+    const auto num_supporting = NumSupportingObservations(result.refined);
+    for (const auto& [id, image] : result.refined.images) {
+      const Rigid3d& before = result.feedforward.images.at(id).cam_from_world;
+      const std::string reason =
+          FindReasonToHold(options, before, image.cam_from_world, num_supporting.at(id));
+      if (reason.empty() || !reasons.emplace(id, reason).second) continue;
+      held.insert(id);
+      must_repeat = must_repeat || HasMoved(before, image.cam_from_world);
     }
-    if (round == 0) result.feedforward = *model;
-    const bool is_last = round + 1 == options.num_rounds;
-    // Twice: the first pass finds the poses, the second sharpens them without what it dropped.
-    // Distortion is released once poses are near: before that it would soak up their errors.
-    const bool releases_lens = options.refine_extra_params && round > 0;
-    AdjustAndFilter(options, releases_lens, is_last ? kFinalMaxErrorPx : max_error_px, *model);
-    const double median_px = ComputeReprojectionStats(*model).median_px;
-    max_error_px = std::clamp(6.0 * median_px, kFinalMaxErrorPx, max_error_px);
-    result.rounds.push_back(AdjustAndFilter(
-        options, options.refine_extra_params, is_last ? kFinalMaxErrorPx : max_error_px, *model));
-    result.refined = std::move(*model);
-    display.Callback()(round + 1, options.num_rounds);
   }
-  for (const ImageId image_id : WeakImages(result.refined, options.min_num_observations)) {
-    result.held_views.push_back(result.refined.images.at(image_id).name);
+  for (const auto& [id, reason] : reasons) {
+    result.held_views.push_back({result.refined.images.at(id).name, reason});
   }
   UpdatePointErrors(result.refined);
   return result;

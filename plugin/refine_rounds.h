@@ -37,20 +37,31 @@ struct RefineRoundsOptions {
   int num_rounds = 3;  // >= 1
   // Views with fewer supporting observations are held at their pose.
   int min_num_observations = 15;
+  // So are views that adjustment turns by more than this: feed-forward networks err by a degree or
+  // two, and what turns a view farther is rarely its true pose. (0, 180].
+  double max_turn_deg = 5.0;
   bool refine_extra_params = true;  // distortion, where the camera's model has it
   int num_threads = 0;
+};
+
+// A view that keeps its feed-forward pose, and why.
+struct HeldView {
+  std::string name;
+  std::string reason;
 };
 
 struct RefineRoundsResult {
   Reconstruction feedforward;  // triangulated with the poses of the seed
   Reconstruction refined;
   std::vector<BundleAdjustmentSummary> rounds;
-  std::vector<std::string> held_views;  // in the last round
+  std::vector<HeldView> held_views;
 };
 
 // Coarse to fine: triangulate with wide limits, adjust robustly at the scale of the error that was
-// measured, drop what does not fit, triangulate again with the better poses and tighter limits.
-// Returns nullopt if nothing could be triangulated.
+// measured, drop what does not fit, triangulate again with the better poses and tighter limits. If
+// a view that moved proves weak or turned too far, all begins anew with that view held, so that it
+// ends exactly at its feed-forward pose and draws no other view along. Returns nullopt if nothing
+// could be triangulated.
 std::optional<RefineRoundsResult> RefineInRounds(const Colmap& colmap,
                                                  const TriangulationInput& input,
                                                  const Reconstruction& seed,

@@ -53,7 +53,7 @@ std::vector<ViewReport> ReportViews(const Workspace& workspace,
     view.num_observations = NumObservations(image);
     view.rotation_change_deg = change_deg_by_name[image.name];
     view.num_supporting = supporting.at(id);
-    view.is_refined = view.num_supporting >= static_cast<size_t>(options.min_num_observations);
+    view.is_refined = !stages["refine"]["result"]["held_views"].contains(image.name);
     views.push_back(view);
   }
   std::sort(views.begin(), views.end(), [](const ViewReport& a, const ViewReport& b) {
@@ -104,6 +104,7 @@ json OptionsAsJson(const PipelineOptions& options) {
           {"refine",
            {{"num_rounds", options.num_refine_rounds},
             {"min_num_observations", options.min_num_observations},
+            {"max_turn_deg", options.max_turn_deg},
             {"refine_extra_params", options.refine_extra_params}}}};
 }
 
@@ -149,7 +150,9 @@ json AsJson(const RefineRoundsResult& result) {
                       {"num_iterations", round.num_iterations},
                       {"gauge", round.gauge}});
   }
-  return {{"rounds", rounds}, {"held_views", result.held_views}};
+  json held_views = json::object();
+  for (const HeldView& view : result.held_views) held_views[view.name] = view.reason;
+  return {{"rounds", rounds}, {"held_views", held_views}};
 }
 
 json AsJson(const PipelineReport& report) {

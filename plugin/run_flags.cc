@@ -25,7 +25,8 @@ void RunFlags::Declare(Flags& flags) {
       .Add("min_num_observations",
            &options_.min_num_observations,
            "A photo with fewer observations of points that three photos see keeps its "
-           "feed-forward pose");
+           "feed-forward pose")
+      .Add("max_turn_deg", &options_.max_turn_deg, "So does one that would turn farther, degrees");
 }
 
 void RunFlags::ApplyTo(PipelineOptions& options) const {
@@ -41,6 +42,7 @@ void RunFlags::ApplyTo(PipelineOptions& options) const {
   options.refine_extra_params = options_.refine_extra_params;
   options.num_refine_rounds = options_.num_refine_rounds;
   options.min_num_observations = options_.min_num_observations;
+  options.max_turn_deg = options_.max_turn_deg;
 }
 
 }  // namespace vgtw

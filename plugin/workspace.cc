@@ -18,7 +18,7 @@ constexpr const char* kFormat = "vgtw-run";
 
 json ReadRecord(const fs::path& path) {
   const json record = json::parse(ReadFile(path), nullptr, /*allow_exceptions=*/false);
-  if (!record.is_object() || record.value("format", "") != kFormat) {
+  if (!record.is_object() || !record.contains("format") || record["format"] != kFormat) {
     Fail(path, "is not a run record of vgtw", "one", "name another --output_path or remove it");
   }
   return record;

@@ -218,7 +218,7 @@ const std::vector<BadInput> kCases = {
      [](const fs::path& root) { WriteFileAtomically(root / "masks/b.png.png", "white"); },
      kMaskApply,
      "b.png.png"},
-    {"MaskApplyOntoItself", Nothing, With(kMaskApply, {"--output_path", "@a.db"}), "in_place"},
+    {"MaskApplyOntoItself", Nothing, With(kMaskApply, {"--output_path", "@a.db"}), "in-place"},
     {"MaskApplyWithoutOutput",
      Nothing,
      {"mask", "apply", "--database_path", "@a.db", "--mask_path", "@masks"},
