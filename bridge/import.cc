@@ -90,7 +90,8 @@ ImportSummary Import(const fs::path& input_path,
                      const fs::path& output_folder,
                      const ImportOptions& options,
                      const ProgressCallback& progress) {
-  if (!fs::exists(input_path)) Fail(input_path, "does not exist", FormatList());
+  std::error_code code;
+  if (!fs::exists(input_path, code)) Fail(input_path, "does not exist", FormatList());
   ImportJob job{{}, image_folder, ListPhotos(image_folder, options.num_threads), options};
   const PhotoIndex photos(job.photos);
   const Located located = options.format == ImportFormat::kAuto

@@ -104,6 +104,9 @@ Camera CameraSource::Make(const Photo& photo) {
 }
 
 std::string CameraSource::Warning() const {
+  if (num_made_ == 0 && !params_.empty()) {
+    return "--camera_params is not used: the file brings intrinsics";
+  }
   if (num_guessed_ == 0) return {};
   return "the focal length of " + std::to_string(num_guessed_) + " of " +
          std::to_string(num_made_) +

@@ -38,7 +38,8 @@ class CameraSource {
 
   Camera Make(const Photo& photo);
 
-  // "" or what a user should know of guessed focal lengths, for all that Make() has made.
+  // "" or what a user should know after all calls of Make(): that focal lengths were guessed, or
+  // that nothing needed the parameters.
   std::string Warning() const;
 
  private:

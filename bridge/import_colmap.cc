@@ -180,6 +180,10 @@ class ColmapImport {
 };
 
 void Read(const ImportJob& job, const ViewSink& sink, ImportSummary& summary) {
+  const CameraSource unused(job.image_folder, job.photos, job.options.camera_params);
+  if (const std::string warning = unused.Warning(); !warning.empty()) {
+    summary.warnings.push_back(warning);
+  }
   ColmapImport(job, summary).Read(sink);
 }
 

@@ -80,6 +80,10 @@ void Read(const ImportJob& job, const ViewSink& sink, ImportSummary& summary) {
          "holds " + std::to_string(reader.shape()[0]) + " poses",
          "one for each of the " + std::to_string(job.photos.size()) + " photos, in their order");
   }
+  const CameraSource unused(job.image_folder, job.photos, job.options.camera_params);
+  if (const std::string warning = unused.Warning(); !warning.empty()) {
+    summary.warnings.push_back(warning);
+  }
   PoseRow row{};
   for (size_t i = 0; i < job.photos.size(); ++i) {
     reader.Read(std::span<double>(row));

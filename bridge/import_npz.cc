@@ -211,16 +211,15 @@ struct StoreOfPhoto {
 std::vector<StoreOfPhoto> FindStores(const fs::path& folder, const PhotoIndex& photos) {
   std::vector<StoreOfPhoto> stores;
   if (!fs::is_directory(folder)) return stores;
-  for (auto entry = fs::recursive_directory_iterator(folder);
-       entry != fs::recursive_directory_iterator();
-       ++entry) {
-    const fs::path relative = entry->path().lexically_relative(folder);
+  for (const auto& entry :
+       fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied)) {
+    const fs::path relative = entry.path().lexically_relative(folder);
     const fs::path name =
-        IsZipFile(entry->path()) ? fs::path(relative).replace_extension() : relative;
-    const bool may_hold = IsZipFile(entry->path()) || entry->is_directory();
+        IsZipFile(entry.path()) ? fs::path(relative).replace_extension() : relative;
+    const bool may_hold = IsZipFile(entry.path()) || entry.is_directory();
     const std::optional<size_t> photo_idx =
         may_hold ? photos.Find(name.generic_string(), true) : std::nullopt;
-    if (photo_idx && HoldsArrays(entry->path())) stores.push_back({entry->path(), *photo_idx});
+    if (photo_idx && HoldsArrays(entry.path())) stores.push_back({entry.path(), *photo_idx});
   }
   std::sort(stores.begin(), stores.end(), [](const StoreOfPhoto& a, const StoreOfPhoto& b) {
     return std::tie(a.photo_idx, a.path) < std::tie(b.photo_idx, b.path);

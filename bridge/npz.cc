@@ -104,9 +104,13 @@ class Archive : public ArrayStore {
 class Folder : public ArrayStore {
  public:
   explicit Folder(const fs::path& path) : ArrayStore(path) {
-    for (const auto& entry : fs::directory_iterator(path)) {
-      if (entry.path().extension() == kExtension) keys_.push_back(entry.path().stem().string());
+    std::error_code code;
+    for (auto entry = fs::directory_iterator(path, code);
+         !code && entry != fs::directory_iterator();
+         entry.increment(code)) {
+      if (entry->path().extension() == kExtension) keys_.push_back(entry->path().stem().string());
     }
+    if (code) throw Error(Printable(path.string()) + ": cannot be read: " + code.message());
     std::sort(keys_.begin(), keys_.end());
   }
 

@@ -179,6 +179,13 @@ TEST(ImportColmap, UnmatchedAndUnsafeNamesAreErrors) {
   }
 }
 
+TEST(ImportColmap, CameraParametersThatNothingNeedsAreToldOf) {
+  Case test(Model());
+  const ImportSummary summary = test.Run({.camera_params = "500"});
+  ASSERT_EQ(summary.warnings.size(), 1u);
+  EXPECT_NE(summary.warnings[0].find("--camera_params is not used"), std::string::npos);
+}
+
 TEST(ImportColmap, PhotosOutsideTheModelAreNoted) {
   Case test(Model());
   WritePhotos(test.folder / "photos", {"z.png"}, 640, 480);
