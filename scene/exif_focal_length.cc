@@ -2,6 +2,8 @@
 #include "scene/exif_focal_length.h"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <memory>
 
 #include <libexif/exif-data.h>
@@ -27,20 +29,21 @@ std::optional<double> ReadTag(ExifData* exif, ExifTag tag) {
   return std::nullopt;
 }
 
-// Millimetres of EXIF's FocalPlaneResolutionUnit.
-std::optional<double> ResolutionUnitMm(int unit) {
-  switch (unit) {
-    case 2:
-      return 25.4;
-    case 3:
-      return 10.0;
-    case 4:
-      return 1.0;
-    case 5:
-      return 0.001;
-    default:
-      return std::nullopt;
-  }
+// Millimetres of EXIF's FocalPlaneResolutionUnit: inches and centimetres, as in COLMAP.
+std::optional<double> ResolutionUnitMm(double unit) {
+  if (unit == 2.0) return 25.4;
+  if (unit == 3.0) return 10.0;
+  return std::nullopt;
+}
+
+// COLMAP reads the focal length from text with one decimal.
+double RoundToTenths(double value) {
+  std::array<char, 32> text;
+  const auto written =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed, 1);
+  double rounded = 0.0;
+  std::from_chars(text.data(), written.ptr, rounded);
+  return rounded;
 }
 
 // The sensor's width follows from PixelXDimension, not from the file's width, because the photo may
@@ -49,8 +52,8 @@ std::optional<double> SensorWidthMm(ExifData* exif) {
   const auto pixels = ReadTag(exif, EXIF_TAG_PIXEL_X_DIMENSION);
   const auto resolution = ReadTag(exif, EXIF_TAG_FOCAL_PLANE_X_RESOLUTION);
   const auto unit = ReadTag(exif, EXIF_TAG_FOCAL_PLANE_RESOLUTION_UNIT);
-  if (!pixels || !resolution || !unit || *resolution <= 0.0 || *unit > 5.0) return std::nullopt;
-  const auto unit_mm = ResolutionUnitMm(static_cast<int>(*unit));
+  if (!pixels || !resolution || !unit || *resolution <= 0.0) return std::nullopt;
+  const auto unit_mm = ResolutionUnitMm(*unit);
   if (!unit_mm) return std::nullopt;
   return *pixels / *resolution * *unit_mm;
 }
@@ -61,8 +64,10 @@ std::optional<double> FocalLengthPx(ExifData* exif, double longer_side) {
   if (film_mm && *film_mm > 0.0) return *film_mm / kFilmWidthMm * longer_side;
   const auto focal_mm = ReadTag(exif, EXIF_TAG_FOCAL_LENGTH);
   const auto sensor_mm = SensorWidthMm(exif);
-  if (!focal_mm || *focal_mm <= 0.0 || !sensor_mm || *sensor_mm <= 0.0) return std::nullopt;
-  return *focal_mm / *sensor_mm * longer_side;
+  if (!focal_mm || !sensor_mm || *sensor_mm <= 0.0) return std::nullopt;
+  const double rounded_mm = RoundToTenths(*focal_mm);
+  if (rounded_mm <= 0.0) return std::nullopt;
+  return rounded_mm / *sensor_mm * longer_side;
 }
 
 }  // namespace

@@ -40,9 +40,11 @@ void WriteImage(const std::filesystem::path& path, const RgbImage& image);
 void WriteImage(const std::filesystem::path& path, const GrayImage& image);
 
 // Focal length in pixels by COLMAP's default rule, from a JPEG's EXIF: 35-mm equivalent / 35 *
-// max(width, height); else FocalLength with the focal plane's resolution; nullopt where neither is
-// given (COLMAP then looks into its sensor table, which is not part of this project, and falls back
-// to 1.2 * max(width, height)). Never throws for damaged EXIF.
+// max(width, height); else FocalLength, rounded to 0.1 mm as COLMAP 3.8 does, over the sensor's
+// width (PixelXDimension / FocalPlaneXResolution, per inch or cm) * max(width, height); nullopt
+// where neither is given. Between the two COLMAP looks into its table of sensors, which is not part
+// of this project; in the end it falls back to 1.2 * max(width, height). Never throws for damaged
+// EXIF.
 std::optional<double> ReadExifFocalLength(const std::filesystem::path& path, const ImageSize& size);
 
 // Names of the images below `folder`, recursively, relative with '/', sorted byte-wise; extensions
