@@ -37,8 +37,8 @@ struct PipelineOptions {
   bool refine_extra_params = true;  // distortion, where the camera model has it
   int num_refine_rounds = 3;
   // A view with fewer observations of points that three views see keeps its feed-forward pose.
-  int min_num_observations = 15;
-  double max_turn_deg = 5.0;  // so does one that refinement would turn farther
+  int min_num_observations = 30;  // COLMAP asks as many inliers of a pose
+  double max_turn_deg = 5.0;      // so does one that refinement would turn farther
 
   int num_threads = 0;
   bool overwrite = false;

@@ -47,6 +47,30 @@ Reconstruction WithoutPoints(const Reconstruction& model) {
   return bare;
 }
 
+// The model without what the given images see. Held views take no part in the adjustment: as fixed
+// cameras their few, often wrong, observations would turn all others around them.
+Reconstruction WithoutObservationsOf(const std::set<ImageId>& image_ids, Reconstruction model) {
+  for (const ImageId image_id : image_ids) {
+    const size_t num_points2D = model.images.at(image_id).points2D.size();
+    for (uint32_t idx = 0; idx < num_points2D; ++idx) {
+      if (model.images.at(image_id).points2D[idx].HasPoint3D()) {
+        RemoveObservation(model, {image_id, idx});
+      }
+    }
+  }
+  return model;
+}
+
+// Takes over cameras, poses and points; points that `adjusted` lacks stay where they are.
+void CopyGeometry(const Reconstruction& adjusted, Reconstruction& model) {
+  model.cameras = adjusted.cameras;
+  for (auto& [id, image] : model.images) {
+    image.cam_from_world = adjusted.images.at(id).cam_from_world;
+  }
+  for (const auto& [id, point3D] : adjusted.points3D) model.points3D.at(id).xyz = point3D.xyz;
+  UpdateFrames(model);
+}
+
 // One robust adjustment at the scale of the model's own error, then a filter.
 BundleAdjustmentSummary AdjustAndFilter(const RefineRoundsOptions& options,
                                         const std::set<ImageId>& held,
@@ -57,9 +81,11 @@ BundleAdjustmentSummary AdjustAndFilter(const RefineRoundsOptions& options,
   adjustment.loss_scale_px = std::max(1.0, ComputeReprojectionStats(model).median_px);
   adjustment.refine_extra_params = refine_extra_params;
   adjustment.num_threads = options.num_threads;
-  adjustment.fixed_images = WeakImages(model, options.min_num_observations);
-  adjustment.fixed_images.insert(held.begin(), held.end());
-  const BundleAdjustmentSummary summary = AdjustBundle(adjustment, model);
+  std::set<ImageId> left_out = WeakImages(model, options.min_num_observations);
+  left_out.insert(held.begin(), held.end());
+  Reconstruction adjusted = WithoutObservationsOf(left_out, model);
+  const BundleAdjustmentSummary summary = AdjustBundle(adjustment, adjusted);
+  CopyGeometry(adjusted, model);
   FilterOptions filter;
   filter.max_reprojection_error_px = max_error_px;
   FilterObservations(filter, model);

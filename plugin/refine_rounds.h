@@ -36,7 +36,7 @@ std::map<ImageId, size_t> NumSupportingObservations(const Reconstruction& model)
 struct RefineRoundsOptions {
   int num_rounds = 3;  // >= 1
   // Views with fewer supporting observations are held at their pose.
-  int min_num_observations = 15;
+  int min_num_observations = 30;
   // So are views that adjustment turns by more than this: feed-forward networks err by a degree or
   // two, and what turns a view farther is rarely its true pose. (0, 180].
   double max_turn_deg = 5.0;
