@@ -306,11 +306,9 @@ std::optional<std::string> ConventionCheck::FindWrongPoses() const {
       FindBetterReading(probes_, DetailsOfProbes(), job_.options.repair);
   if (!better) return std::nullopt;
   const std::string options = OptionsText(*better);
-  return "the poses contradict depth and photos, and agree far better " +
-         (options.empty() ? "without the repairs asked for: leave them out"
-                          : "when read with " + options +
-                                ": add that if the file's convention is "
-                                "not certain");
+  return "the poses contradict the depth, the points or the photos, and agree far better " +
+         (options.empty() ? "without the repairs asked for: import again without them"
+                          : "read with " + options + ": import again with that");
 }
 
 std::vector<const PhotoDetail*> ConventionCheck::DetailsOfProbes() const {

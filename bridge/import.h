@@ -34,10 +34,10 @@ struct ConventionRepair {
 struct ImportOptions {
   ImportFormat format = ImportFormat::kAuto;
   ImportResize resize = ImportResize::kAuto;
-  ConventionRepair repair;
+  ConventionRepair repair = {};
   // Intrinsics for formats without them: "fx,fy,cx,cy" or "f" in original pixels; else EXIF; else
   // 1.2 * max(width, height) with a warning.
-  std::string camera_params;
+  std::string camera_params = {};
   bool overwrite = false;
   int num_threads = 0;
 };

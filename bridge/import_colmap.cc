@@ -120,7 +120,7 @@ class ColmapImport {
     }
     const Eigen::Vector2d shift =
         DetectShift(Residuals(model_, model_camera, view.cam_from_world, image));
-    if (!shift.isZero()) ++num_images_by_shift_[ShiftText(shift)];
+    if (!shift.isZero()) ++NumImagesWithShift(shift);
     AddSamples(image, shift, scale, imported);
     return imported;
   }
@@ -146,9 +146,20 @@ class ColmapImport {
     }
   }
 
+  // Shifts that are the same but for rounding are one.
+  size_t& NumImagesWithShift(const Eigen::Vector2d& shift) {
+    constexpr double kSamePx = 0.01;
+    for (auto& [known, count] : num_images_by_shift_) {
+      if ((known - shift).norm() < kSamePx) return count;
+    }
+    return num_images_by_shift_.emplace_back(shift, 0).second;
+  }
+
   static std::string ShiftText(const Eigen::Vector2d& shift) {
+    // Adding 0 turns -0 into 0.
+    const auto rounded = [](double value) { return std::round(1000.0 * value) / 1000.0 + 0.0; };
     char text[64];
-    std::snprintf(text, sizeof(text), "(%+.3f, %+.3f)", shift.x(), shift.y());
+    std::snprintf(text, sizeof(text), "(%+.3f, %+.3f)", rounded(shift.x()), rounded(shift.y()));
     return text;
   }
 
@@ -157,8 +168,9 @@ class ColmapImport {
       summary_.notes.push_back("cameras rescaled " + text + " pixels, the photos' size, in " +
                                std::to_string(count) + " images");
     }
-    for (const auto& [text, count] : num_images_by_shift_) {
-      summary_.notes.push_back("points2D moved by " + text + " pixels in " + std::to_string(count) +
+    for (const auto& [shift, count] : num_images_by_shift_) {
+      summary_.notes.push_back("points2D moved by " + ShiftText(shift) + " pixels in " +
+                               std::to_string(count) +
                                " images: a constant shift of the exporter, found by reprojection");
     }
     if (num_behind_ > 0) {
@@ -175,7 +187,7 @@ class ColmapImport {
   ImportSummary& summary_;
   Reconstruction model_;
   std::map<std::string, size_t> num_images_by_rescale_;
-  std::map<std::string, size_t> num_images_by_shift_;
+  std::vector<std::pair<Eigen::Vector2d, size_t>> num_images_by_shift_;
   size_t num_behind_ = 0;
 };
 

@@ -50,9 +50,10 @@ int main(int argc, char** argv) {
                 model.points3D.size() > 100 ? "more than 100" : "too few");
     const auto comparison = vgtw::ComparePoses(vgtw::CamFromWorldByName(model), TruePoses(scene));
     if (!comparison.has_value()) return 1;
-    std::printf("centres off by %.1f %% of the extent, rotations by %.1f deg (Sim3-aligned)\n",
-                comparison->centre_rmse_percent,
-                comparison->rotation_mean_deg);
+    std::printf("centres off by %.1f %% of the extent (RMSE, Sim3-aligned)\n",
+                comparison->centre_rmse_percent);
+    std::printf("relative rotations off by %.1f deg (median of pairs)\n",
+                comparison->relative_rotation_median_deg);
     return 0;
   } catch (const vgtw::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());

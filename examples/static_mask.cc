@@ -4,7 +4,7 @@
 // A photo of 16 x 12 pixels went into the network at half its size. There, a distractor covers the
 // 2 x 2 pixels from (3, 2) on, and nothing is known of the last column (a crop, say). The mask has
 // the photo's size; '#' is excluded (0), '.' kept (255). Dilation adds a margin, because a feature
-// descriptor looks around its keypoint.
+// descriptor looks around its keypoint. A pixel whose interpolation touches the unknown is unknown.
 #include "scene/distractor_mask.h"
 #include "scene/view.h"
 

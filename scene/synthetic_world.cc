@@ -242,7 +242,7 @@ MoverState FindMover(const SyntheticOptions& options, const View& view, int move
   RandomStream random(HashKey({options.seed, kMoverStream, static_cast<uint64_t>(mover)}));
   const double phase = 2.0 * kPi * (mover + random.Uniform(0.0, 0.5)) / options.num_distractors;
   const double pace = (mover % 2 == 0 ? 1.0 : -1.0) * random.Uniform(0.25, 0.4);
-  const double base_distance = random.Uniform(2.6, 3.3);
+  const double base_distance = random.Uniform(2.8, 3.4);
   const double first_yaw_rad = random.Uniform(0.0, 2.0 * kPi);
   const double yaw_rad = first_yaw_rad + random.Uniform(-0.12, 0.12) * view_idx;
   const double lateral = 0.8 * std::sin(phase + pace * view_idx);

@@ -3,6 +3,7 @@
 #include "bridge/import.h"
 #include "bridge/predictions.h"
 #include "scene/error.h"
+#include "scene/files.h"
 #include "tests/bridge/numpy_files.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/synthetic_model.h"
@@ -171,11 +172,23 @@ TEST(ImportColmap, NamesAreMatchedByBaseNameIfUnique) {
 }
 
 TEST(ImportColmap, UnmatchedAndUnsafeNamesAreErrors) {
-  for (const char* name : {"other.png", "../../etc/passwd", "/etc/passwd", "p1.png.exe"}) {
+  for (const char* name : {"other.png", "p1.png.exe"}) {
     Reconstruction model = Model();
     model.images.begin()->second.name = name;
     const std::string message = Case(model).Message();
     EXPECT_NE(message.find("1 of 6 names match no photo"), std::string::npos) << message;
+  }
+  // Our writer refuses names that leave the folder, so they are put into its bytes.
+  for (const std::string name : {"../../etc/passwd", "/etc/passwd"}) {
+    Reconstruction model = Model();
+    const std::string placeholder(name.size(), 'x');
+    model.images.begin()->second.name = placeholder;
+    Case test(model);
+    std::string bytes = ReadFile(test.input / "images.bin");
+    bytes.replace(bytes.find(placeholder), name.size(), name);
+    WriteFileAtomically(test.input / "images.bin", bytes);
+    const std::string message = test.Message();
+    EXPECT_NE(message.find(name), std::string::npos) << message;
   }
 }
 
@@ -236,10 +249,10 @@ TEST(ImportColmap, FernOfVggt) {
 
 TEST(ImportColmap, RoomOfVggt) {
   VGTW_NEED_SHARED_DATA();
-  // 2e-4 px of the file at 1280 px, 1e-4 px of rounding to float.
+  // 2e-4 px of the file on each axis at 1280 px, 1e-4 px of rounding to float.
   ExpectRealModel({"room_nooverlap_vggt",
                    100000,
-                   3e-4,
+                   4e-4,
                    {"(+0.000, +156.293) pixels in 7 images", "(+0.000, +62.5"}});
 }
 

@@ -241,7 +241,7 @@ TEST(ImportNpz, ViewsWithoutAUsablePoseAreLeftOutWithAWarning) {
 TEST(ImportNpz, BadInputsAreErrorsOfOneLine) {
   const std::vector<float> nans(24, kNan);
   const std::vector<std::pair<std::string, std::string>> cases = {
-      {MessageWith("extrinsic", NpyFloats("(3, 3, 4)", std::vector<float>(36, 1))), "2 photos"},
+      {MessageWith("extrinsic", NpyFloats("(3, 3, 4)", std::vector<float>(36, 1))), "3 views"},
       {MessageWith("extrinsic", NpyFloats("(2, 12)", kExtrinsics)), "(S, 3, 4)"},
       {MessageWith("extrinsic", NpyFloats("(2, 3, 4)", std::vector<float>(24, 0.1f))), "rotation"},
       {MessageWith("extrinsic", NpyFloats("(2, 3, 4)", nans)), "no usable view"},

@@ -140,8 +140,7 @@ ColourDifferences CompareNeighbours(const SyntheticScene& scene) {
   ColourDifferences differences;
   for (int y = 0; y < first.image.height(); ++y) {
     for (int x = 0; x < first.image.width(); ++x) {
-      DepthMap depth = first.depth;
-      const auto point = UnprojectPixel(scene.views()[0], depth, x, y);
+      const auto point = UnprojectPixel(scene.views()[0], first.depth, x, y);
       const Eigen::Vector3d point_in_second = scene.views()[1].cam_from_world * point.value();
       const auto pixel = Project(scene.views()[1].camera, point_in_second);
       if (!pixel || !second.image.Contains(static_cast<int>(std::floor(pixel->x())),
