@@ -19,7 +19,7 @@ NpyReader ReaderOf(const std::string& bytes) {
   return NpyReader(
       [bytes, position](std::span<std::byte> target) {
         const size_t count = std::min(target.size(), bytes.size() - *position);
-        std::memcpy(target.data(), bytes.data() + *position, count);
+        if (count > 0) std::memcpy(target.data(), bytes.data() + *position, count);
         *position += count;
         return count;
       },
