@@ -25,7 +25,7 @@ std::string EntryOrigin(const fs::path& path, const std::string& key) {
   std::string found;
   for (const std::string& other : store.keys()) found += (found.empty() ? "" : ", ") + other;
   Fail(store.path(),
-       "has no array '" + key + "' (it has: " + Printable(found) + ")",
+       "has no array '" + Printable(key) + "' (it has: " + Printable(found) + ")",
        "an array of that name");
 }
 

@@ -188,9 +188,10 @@ Json ToJson(const PredictionsIndex::Entry& entry) {
 PredictionsIndex ParsePredictionsIndex(std::string_view text, const std::filesystem::path& path) {
   const Json json = ParseJson(text, path);
   const Fields fields(json, "the file", path);
-  if (fields.At("format") != kFormat || fields.At("version") != kVersion) {
-    fields.Fail("has format " + Printable(json["format"].dump()) + ", version " +
-                    Printable(json["version"].dump()),
+  const Json& format = fields.At("format");
+  const Json& version = fields.At("version");
+  if (format != kFormat || version != kVersion) {
+    fields.Fail("has format " + Printable(format.dump()) + ", version " + Printable(version.dump()),
                 std::string("format \"") + kFormat + "\", version " + std::to_string(kVersion));
   }
   PredictionsIndex index;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <limits>
 
 namespace vgtw {
 namespace {
@@ -24,7 +25,27 @@ size_t Utf8Length(std::string_view text) {
   return is_bad ? 0 : length;
 }
 
+// Replaces control characters and invalid bytes by '?', and cuts after `max_length` bytes.
+std::string OneLine(std::string_view text, size_t max_length) {
+  std::string line;
+  while (!text.empty() && line.size() < max_length) {
+    const size_t length = Utf8Length(text);
+    const auto byte = static_cast<unsigned char>(text.front());
+    if (length == 0 || byte < 0x20 || byte == 0x7f) {
+      line += '?';
+    } else {
+      line += text.substr(0, length);
+    }
+    text.remove_prefix(std::max<size_t>(length, 1));
+  }
+  if (!text.empty()) line += "...";
+  return line;
+}
+
 }  // namespace
+
+Error::Error(std::string_view line)
+    : std::runtime_error(OneLine(line, std::numeric_limits<size_t>::max())) {}
 
 void Fail(const std::filesystem::path& path,
           std::string_view found,
@@ -43,19 +64,7 @@ void FailErrno(const std::filesystem::path& path, std::string_view what) {
 
 std::string Printable(std::string_view text) {
   constexpr size_t kMaxLength = 200;
-  std::string printable;
-  while (!text.empty() && printable.size() < kMaxLength) {
-    const size_t length = Utf8Length(text);
-    const auto byte = static_cast<unsigned char>(text.front());
-    if (length == 0 || byte < 0x20 || byte == 0x7f) {
-      printable += '?';
-    } else {
-      printable += text.substr(0, length);
-    }
-    text.remove_prefix(std::max<size_t>(length, 1));
-  }
-  if (!text.empty()) printable += "...";
-  return printable;
+  return OneLine(text, kMaxLength);
 }
 
 }  // namespace vgtw

@@ -14,7 +14,8 @@ namespace vgtw {
 // may happen (no convergence, too few points) is a return value.
 class Error : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  // Control characters and invalid bytes, which foreign names may hold, become '?'.
+  explicit Error(std::string_view line);
 };
 
 // Throws Error "<path>: <found>, expected <expected>; <hint>". `hint` may be empty.
@@ -27,7 +28,7 @@ class Error : public std::runtime_error {
 [[noreturn]] void FailErrno(const std::filesystem::path& path, std::string_view what);
 
 // `text` with control characters and invalid bytes replaced by '?', cut after 200 bytes: for
-// quoting foreign bytes in a one-line message.
+// quoting foreign bytes of any length.
 std::string Printable(std::string_view text);
 
 }  // namespace vgtw

@@ -57,6 +57,10 @@ TEST(PredictionsJson, ReadsTheDocumentedFormat) {
   EXPECT_EQ(view.original_from_network, map);
 }
 
+TEST(PredictionsJson, AnotherFormatWithoutVersionIsAnError) {
+  EXPECT_THAT(ErrorIn(R"({"format": "another"})"), HasSubstr("lacks 'version'"));
+}
+
 TEST(PredictionsJson, DoublesAreReadBackExactly) {
   PredictionsIndex index = ParsePredictionsIndex(kText, kPath);
   View& view = index.entries[0].view;

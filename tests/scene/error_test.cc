@@ -35,6 +35,11 @@ TEST(Check, ThrowsConditionAndMessage) {
   EXPECT_NO_THROW(VGTW_CHECK(value < 0, "value"));
 }
 
+TEST(Error, IsOneLineWhateverItQuotes) {
+  EXPECT_STREQ(Error("a\nb\x1b[0m\xff").what(), "a?b?[0m?");
+  EXPECT_STREQ(Error(std::string(5000, 'a')).what(), std::string(5000, 'a').c_str());
+}
+
 TEST(Printable, KeepsTextOfAnyLanguage) {
   const std::string text = "a \xc3\xa4 \xe2\x82\xac \xf0\x9f\x98\x80 ~";
   EXPECT_EQ(Printable(text), text);
