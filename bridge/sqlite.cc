@@ -4,10 +4,12 @@
 #include "scene/error.h"
 #include "scene/files.h"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <fstream>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <sqlite3.h>
@@ -27,8 +29,14 @@ fs::path Sibling(const fs::path& path, const char* suffix) {
   return sibling;
 }
 
+// Bytes of SQLite's file header that tell its journal mode.
+constexpr size_t kWriteVersionByte = 18;
+constexpr size_t kReadVersionByte = 19;
+constexpr char kRollbackMode = 1;
+constexpr char kWalMode = 2;
+
 // Refuses what SQLite would silently take for an empty database, and says whether the file is in
-// WAL mode (bytes 18 and 19 of SQLite's file header).
+// WAL mode.
 bool CheckHeader(const fs::path& path) {
   std::error_code code;
   const fs::file_status status = fs::status(path, code);
@@ -46,7 +54,7 @@ bool CheckHeader(const fs::path& path) {
       std::string_view(header.data(), kMagic.size()) != kMagic) {
     Fail(path, "is not an SQLite file", kExpected);
   }
-  return header[18] == 2 || header[19] == 2;
+  return header[kWriteVersionByte] == kWalMode || header[kReadVersionByte] == kWalMode;
 }
 
 // SQLite's URI of a file; the characters that mean something in a URI are escaped.
@@ -169,7 +177,17 @@ void SqliteConnection::ExecuteScript(const std::string& sql) {
 
 int64_t SqliteConnection::NumChangedRows() const { return sqlite3_changes64(handle_); }
 
-void SqliteConnection::CopyTo(const fs::path& target_path) const {
+void SqliteConnection::CopyTo(const fs::path& target_path) {
+  VGTW_CHECK(InTransaction(), "a copy needs a transaction that holds writers off");
+  ExecuteScript("SELECT count(*) FROM sqlite_master;");  // BEGIN alone takes no lock yet
+  if (fs::exists(Sibling(path_, "-wal"))) {
+    CopyPages(target_path);
+  } else {
+    CopyBytes(target_path);
+  }
+}
+
+void SqliteConnection::CopyPages(const fs::path& target_path) const {
   SqliteConnection target(target_path, Mode::kPrivate);
   sqlite3_backup* backup = sqlite3_backup_init(target.handle_, "main", handle_, "main");
   if (backup == nullptr) target.Throw(sqlite3_errcode(target.handle_));
@@ -177,6 +195,28 @@ void SqliteConnection::CopyTo(const fs::path& target_path) const {
   const int code = sqlite3_backup_finish(backup);
   if (code != SQLITE_OK) target.Throw(code);
   if (step_code != SQLITE_DONE) ThrowSqlite(path_, nullptr, step_code);
+  target.ExecuteScript("PRAGMA journal_mode = DELETE;");  // the page copy is in WAL mode
+}
+
+// Several times faster than page by page. SQLite's own file is read, because closing another
+// descriptor of the same file would drop the lock.
+void SqliteConnection::CopyBytes(const fs::path& target_path) const {
+  sqlite3_file* file = nullptr;
+  sqlite3_file_control(handle_, "main", SQLITE_FCNTL_FILE_POINTER, &file);
+  sqlite3_int64 size = 0;
+  int code = file->pMethods->xFileSize(file, &size);
+  if (code != SQLITE_OK) Throw(code);
+  std::ofstream target(target_path, std::ios::binary | std::ios::trunc);
+  std::vector<char> block(size_t{1} << 20);
+  for (sqlite3_int64 offset = 0; offset < size && target.good(); offset += std::ssize(block)) {
+    block.resize(static_cast<size_t>(std::min<sqlite3_int64>(std::ssize(block), size - offset)));
+    code = file->pMethods->xRead(file, block.data(), static_cast<int>(block.size()), offset);
+    if (code != SQLITE_OK) Throw(code);
+    if (offset == 0) block[kWriteVersionByte] = block[kReadVersionByte] = kRollbackMode;
+    target.write(block.data(), std::ssize(block));
+  }
+  target.close();
+  if (!target.good()) FailErrno(target_path, "cannot be written");
 }
 
 sqlite3_stmt* SqliteConnection::TakeStatement(std::string_view sql) {

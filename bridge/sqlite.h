@@ -54,12 +54,15 @@ class SqliteConnection {
   void ExecuteScript(const std::string& sql);
   int64_t NumChangedRows() const;  // by the last Execute
 
-  // Copies all content, including what a -wal file holds, to a new file at `target_path`.
-  void CopyTo(const std::filesystem::path& target_path) const;
+  // Copies all content, including what a -wal file holds, into one file at `target_path`, in
+  // rollback mode. Needs a transaction (see SqliteTransaction).
+  void CopyTo(const std::filesystem::path& target_path);
 
  private:
   friend class SqliteQuery;
   void Open();
+  void CopyPages(const std::filesystem::path& target_path) const;
+  void CopyBytes(const std::filesystem::path& target_path) const;
   [[noreturn]] void Throw(int code) const;
   sqlite3_stmt* TakeStatement(std::string_view sql);
   void GiveBack(const std::string& sql, sqlite3_stmt* statement) noexcept;

@@ -43,6 +43,12 @@ void MakeDatabaseWithWal(const std::filesystem::path& path) {
   ASSERT_TRUE(std::filesystem::exists(path.string() + "-wal"));
 }
 
+void CopyDatabase(const std::filesystem::path& from, const std::filesystem::path& to) {
+  SqliteConnection source(from, Mode::kReadOnly);
+  const SqliteTransaction snapshot(source);
+  source.CopyTo(to);
+}
+
 TEST(SqliteQuery, ValuesComeBackAsBound) {
   const TemporaryFolder folder;
   SqliteConnection connection(folder / "a.db", Mode::kPrivate);
@@ -128,10 +134,34 @@ TEST(SqliteConnection, ReadOnlySeesWhatLiesInTheWal) {
 TEST(SqliteConnection, CopyHoldsWhatLiesInTheWalInOneFile) {
   const TemporaryFolder folder;
   MakeDatabaseWithWal(folder / "a.db");
-  SqliteConnection(folder / "a.db", Mode::kReadOnly).CopyTo(folder / "b.db");
-  SqliteConnection copy(folder / "b.db", Mode::kReadOnly);
+  CopyDatabase(folder / "a.db", folder / "b.db");
+  SqliteConnection copy(folder / "b.db", Mode::kReadWrite);
   EXPECT_EQ(SumOfRows(copy), 11);
   EXPECT_FALSE(std::filesystem::exists(folder / "b.db-wal"));
+}
+
+TEST(SqliteConnection, CopyOfAClosedDatabaseIsInRollbackMode) {
+  const TemporaryFolder folder;
+  MakeDatabase(folder / "delete.db");
+  MakeDatabase(folder / "wal.db");
+  SqliteConnection(folder / "wal.db", Mode::kReadWrite).ExecuteScript("PRAGMA journal_mode = WAL;");
+  CopyDatabase(folder / "delete.db", folder / "delete copy.db");
+  CopyDatabase(folder / "wal.db", folder / "wal copy.db");
+  EXPECT_TRUE(ReadFile(folder / "delete copy.db") == ReadFile(folder / "delete.db"));
+  SqliteConnection copy(folder / "wal copy.db", Mode::kReadWrite);
+  EXPECT_EQ(SumOfRows(copy), 1);
+  EXPECT_FALSE(std::filesystem::exists(folder / "wal copy.db-wal"));
+}
+
+TEST(SqliteConnection, CopyHoldsWritersOff) {
+  const TemporaryFolder folder;
+  MakeDatabase(folder / "a.db");
+  SqliteConnection source(folder / "a.db", Mode::kReadOnly);
+  EXPECT_THROW(source.CopyTo(folder / "b.db"), std::invalid_argument);
+  const SqliteTransaction snapshot(source);
+  source.CopyTo(folder / "b.db");
+  SqliteConnection writer(folder / "a.db", Mode::kReadWrite);
+  EXPECT_THAT(ErrorOf([&] { writer.Execute("INSERT INTO t VALUES (2)"); }), HasSubstr("is locked"));
 }
 
 TEST(SqliteConnection, LockedDatabaseIsNamed) {
