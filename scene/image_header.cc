@@ -94,10 +94,19 @@ std::optional<ImageSize> ParseJpegSize(Bytes file) {
   return std::nullopt;
 }
 
-std::optional<ImageSize> ParsePngSize(Bytes file) {
+// Width and height (u32), bit depth, colour type, ...; empty for other files.
+Bytes FindPngHeader(Bytes file) {
+  constexpr size_t kNumBytes = 13;
+  if (!StartsWith(file, kPngSignature)) return {};
   const Bytes chunk = file.subspan(kPngSignature.size());
-  if (chunk.size() < 16 || !StartsWith(chunk.subspan(4), "IHDR")) return std::nullopt;
-  return NonZero(BigEndian(chunk, 8, 4), BigEndian(chunk, 12, 4));
+  if (chunk.size() < 8 + kNumBytes || !StartsWith(chunk.subspan(4), "IHDR")) return {};
+  return chunk.subspan(8, kNumBytes);
+}
+
+std::optional<ImageSize> ParsePngSize(Bytes file) {
+  const Bytes header = FindPngHeader(file);
+  if (header.empty()) return std::nullopt;
+  return NonZero(BigEndian(header, 0, 4), BigEndian(header, 4, 4));
 }
 
 bool JpegHasEnd(Bytes file) {
@@ -126,6 +135,13 @@ std::optional<ImageSize> ParseImageSize(Bytes file) {
   if (StartsWith(file, kJpegSignature)) return ParseJpegSize(file);
   if (StartsWith(file, kPngSignature)) return ParsePngSize(file);
   return std::nullopt;
+}
+
+bool IsGrayPng(Bytes file) {
+  constexpr std::byte kBitDepth{8};
+  constexpr std::byte kGray{0};
+  const Bytes header = FindPngHeader(file);
+  return !header.empty() && header[8] == kBitDepth && header[9] == kGray;
 }
 
 bool IsTruncated(Bytes file) {

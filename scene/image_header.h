@@ -15,6 +15,9 @@ namespace vgtw {
 // Size of a JPEG (first frame header) or PNG (IHDR); nullopt for other or damaged files.
 std::optional<ImageSize> ParseImageSize(std::span<const std::byte> file);
 
+// Whether a PNG has one channel of 8 bits: gray without palette or alpha, as masks are written.
+bool IsGrayPng(std::span<const std::byte> file);
+
 // Whether a JPEG or PNG ends before its end marker (EOI, IEND). Decoders fill the rest of such a
 // JPEG with grey without a word. False for other formats. Bytes behind the end marker are allowed,
 // because phones append thumbnails and videos there.

@@ -55,6 +55,15 @@ TEST(ParseImageSize, IsUnknownForOtherAndEmptyImages) {
   EXPECT_EQ(ParseImageSize(Bytes("\xff\xd8\xff\xd9")), std::nullopt);
 }
 
+TEST(IsGrayPng, IsOneChannelOf8Bits) {
+  EXPECT_TRUE(IsGrayPng(Bytes(MakePng(2, 1, 8, 0, std::string(3, '\0')))));
+  EXPECT_FALSE(IsGrayPng(Bytes(MakePng(2, 1, 1, 0, std::string(2, '\0')))));
+  EXPECT_FALSE(IsGrayPng(Bytes(MakePng(2, 1, 16, 0, std::string(5, '\0')))));
+  EXPECT_FALSE(IsGrayPng(Bytes(MakePng(2, 1, 8, 4, std::string(5, '\0')))));  // with alpha
+  EXPECT_FALSE(IsGrayPng(Bytes(EncodedImage("a.png"))));
+  EXPECT_FALSE(IsGrayPng(Bytes(EncodedImage("a.jpg"))));
+}
+
 TEST(IsTruncated, HoldsForEveryProperPrefix) {
   for (const std::string name : {"a.jpg", "a.png"}) {
     const std::string file = EncodedImage(name);

@@ -128,6 +128,11 @@ TEST(ReadStaticMask, KeepsEveryNonZeroGray) {
   const TemporaryFolder folder;
   WriteFileAtomically(folder / "gray.png", MakePng(4, 1, 8, 0, std::string("\0\0\x01\x80\xff", 5)));
   EXPECT_EQ(ReadStaticMask(folder / "gray.png").data(), (std::vector<uint8_t>{0, 255, 255, 255}));
+  // The gray that counts as transparent is gray to COLMAP, too.
+  WriteFileAtomically(
+      folder / "transparent.png",
+      MakePng(2, 1, 8, 0, std::string("\0\x80\0", 3), PngChunk("tRNS", std::string("\0\x80", 2))));
+  EXPECT_EQ(ReadStaticMask(folder / "transparent.png").data(), (std::vector<uint8_t>{255, 0}));
 }
 
 TEST(ReadStaticMask, ReadsBitsPalettesAndAlpha) {
