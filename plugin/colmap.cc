@@ -13,13 +13,12 @@ namespace vgtw {
 namespace {
 
 // Options that later versions renamed: 3.8's word and its successor.
-constexpr std::array<std::pair<const char*, const char*>, 6> kRenamedOptions = {{
+constexpr std::array<std::pair<const char*, const char*>, 5> kRenamedOptions = {{
     {"SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"},
     {"SiftExtraction.num_threads", "FeatureExtraction.num_threads"},
     {"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"},
     {"SiftMatching.use_gpu", "FeatureMatching.use_gpu"},
     {"SiftMatching.num_threads", "FeatureMatching.num_threads"},
-    {"random_seed", "default_random_seed"},
 }};
 
 bool Mentions(const std::string& help, const std::string& option) {

@@ -77,8 +77,7 @@ Finding CheckColmap(const fs::path& executable, json& result) {
 fs::path FindNetworkProgram() {
   std::error_code ignored;
   const fs::path folder = fs::read_symlink("/proc/self/exe", ignored).parent_path();
-  for (const char* relative :
-       {"vgtw-network", "../libexec/vgtw/vgtw-network", "../network/vgtw-network"}) {
+  for (const char* relative : {"vgtw-network", "../libexec/vgtw/vgtw-network"}) {
     const fs::path path = FindExecutable((folder / relative).string());
     if (!path.empty()) return path;
   }

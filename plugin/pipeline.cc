@@ -179,11 +179,12 @@ void Pipeline::ExtractFeatures() {
 json Pipeline::CheckFeatures(const fs::path& database_path, const std::string& last_words) const {
   const auto counts = CountExcludedKeypoints(
       database_path, options_.use_masks ? workspace_.masks() : fs::path(), options_.num_threads);
-  uint64_t num_keypoints = 0;
+  json views = json::object();
   uint64_t num_excluded = 0;
   size_t num_images = 0;
   for (const ApplyMasksImageSummary& image : counts) {
-    num_keypoints += image.num_keypoints;
+    views[image.image_name] = {{"num_keypoints", image.num_keypoints},
+                               {"num_excluded_keypoints", image.num_excluded_keypoints}};
     num_excluded += image.num_excluded_keypoints;
     if (image.num_keypoints > 0) ++num_images;
   }
@@ -199,7 +200,7 @@ json Pipeline::CheckFeatures(const fs::path& database_path, const std::string& l
          "0",
          "this version of colmap did not read the masks: see the log");
   }
-  return {{"num_keypoints", num_keypoints}, {"num_images_with_keypoints", num_images}};
+  return {{"views", views}};
 }
 
 void Pipeline::MatchFeatures() {

@@ -2,7 +2,6 @@
 #include "plugin/report.h"
 
 #include "bridge/colmap_model.h"
-#include "bridge/mask_apply.h"
 #include "bridge/predictions.h"
 #include "plugin/table.h"
 #include "scene/error.h"
@@ -21,39 +20,33 @@ size_t NumObservations(const Image& image) {
       }));
 }
 
-std::vector<ViewReport> ReportViews(const Workspace& workspace,
-                                    const PipelineOptions& options,
+std::vector<ViewReport> ReportViews(const json& stages,
                                     const Reconstruction& feedforward,
                                     const Reconstruction& refined) {
-  const auto features =
-      CountExcludedKeypoints(workspace.database(),
-                             options.use_masks ? workspace.masks() : std::filesystem::path(),
-                             options.num_threads);
-  std::map<std::string, const ApplyMasksImageSummary*> features_by_name;
-  for (const auto& summary : features) features_by_name[summary.image_name] = &summary;
   std::map<std::string, double> change_deg_by_name;
   if (const auto change =
           ComparePoses(CamFromWorldByName(refined), CamFromWorldByName(feedforward))) {
     for (const auto& view : change->views)
       change_deg_by_name[view.name] = view.relative_rotation_deg;
   }
-  const json stages = workspace.record().value("stages", json::object());
+  const json& features = stages.at("features").at("result").at("views");
   const std::map<ImageId, size_t> supporting = NumSupportingObservations(refined);
   std::vector<ViewReport> views;
   for (const auto& [id, image] : refined.images) {
     ViewReport view;
     view.name = image.name;
-    if (const auto found = features_by_name.find(image.name); found != features_by_name.end()) {
-      view.num_keypoints = found->second->num_keypoints;
-      view.num_excluded_keypoints = found->second->num_excluded_keypoints;
+    if (const auto found = features.find(image.name); found != features.end()) {
+      view.num_keypoints = found->at("num_keypoints");
+      view.num_excluded_keypoints = found->at("num_excluded_keypoints");
     }
     if (stages.contains("masks")) {
-      view.excluded_share = stages["masks"]["result"]["excluded_share"].value(image.name, 0.0);
+      const json& shares = stages.at("masks").at("result").at("excluded_share");
+      view.excluded_share = shares.value(image.name, 0.0);
     }
     view.num_observations = NumObservations(image);
     view.rotation_change_deg = change_deg_by_name[image.name];
     view.num_supporting = supporting.at(id);
-    view.is_refined = !stages["refine"]["result"]["held_views"].contains(image.name);
+    view.is_refined = !stages.at("refine").at("result").at("held_views").contains(image.name);
     views.push_back(view);
   }
   std::sort(views.begin(), views.end(), [](const ViewReport& a, const ViewReport& b) {
@@ -192,11 +185,11 @@ PipelineReport MakeReport(const Workspace& workspace, const PipelineOptions& opt
   const Reconstruction feedforward = ReadModel(workspace.feedforward());
   const Reconstruction refined = ReadModel(workspace.refined());
   PipelineReport report;
-  report.views = ReportViews(workspace, options, feedforward, refined);
+  const json& stages = workspace.record().at("stages");
+  report.views = ReportViews(stages, feedforward, refined);
   report.feedforward = ComputeReprojectionStats(feedforward);
   report.refined = ComputeReprojectionStats(refined);
-  report.num_matched_pairs =
-      workspace.record()["stages"]["matches"]["result"].value("num_verified_pairs", size_t{0});
+  report.num_matched_pairs = stages.at("matches").at("result").at("num_verified_pairs");
   if (options.reference_path.empty()) return report;
   const auto reference = ReadPoses(options.reference_path);
   report.feedforward_error = ComparePoses(CamFromWorldByName(feedforward), reference);

@@ -64,7 +64,8 @@ json Workspace::RunStage(const std::string& stage,
                          const std::function<json()>& work) {
   chain_ = HashText(chain_ + "\n" + stage + "\n" + kVersion + "\n" + inputs.dump());
   const json previous = record_.value("stages", json::object()).value(stage, json::object());
-  const bool is_made = previous.contains("hash") && fs::exists(output);
+  const bool is_made =
+      previous.contains("hash") && previous.contains("result") && fs::exists(output);
   if (is_made && previous["hash"] == chain_ && !force_) {
     Announce(stage + ": up to date");
     return previous["result"];
