@@ -111,6 +111,7 @@ AtomicFile::~AtomicFile() {
 
 void AtomicFile::Write(std::span<const std::byte> bytes) {
   VGTW_CHECK(file_ != nullptr, "the file is committed");
+  if (bytes.empty()) return;  // a null pointer must not reach fwrite
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) {
     FailErrno(path_, "cannot be written");
   }

@@ -94,6 +94,12 @@ std::optional<ImageSize> ParseJpegSize(Bytes file) {
   return std::nullopt;
 }
 
+constexpr size_t kBitDepth = 8;  // offsets in a PNG's header
+constexpr size_t kColourType = 9;
+constexpr std::byte kGray{0};
+constexpr std::byte kGrayWithAlpha{4};
+constexpr std::byte kRgbWithAlpha{6};
+
 // Width and height (u32), bit depth, colour type, ...; empty for other files.
 Bytes FindPngHeader(Bytes file) {
   constexpr size_t kNumBytes = 13;
@@ -138,10 +144,15 @@ std::optional<ImageSize> ParseImageSize(Bytes file) {
 }
 
 bool IsGrayPng(Bytes file) {
-  constexpr std::byte kBitDepth{8};
-  constexpr std::byte kGray{0};
   const Bytes header = FindPngHeader(file);
-  return !header.empty() && header[8] == kBitDepth && header[9] == kGray;
+  return !header.empty() && header[kBitDepth] == std::byte{8} && header[kColourType] == kGray;
+}
+
+bool HasAlphaForPython(Bytes file) {
+  const Bytes header = FindPngHeader(file);
+  if (header.empty()) return false;
+  return header[kColourType] == kRgbWithAlpha ||
+         (header[kColourType] == kGrayWithAlpha && header[kBitDepth] == std::byte{16});
 }
 
 bool IsTruncated(Bytes file) {

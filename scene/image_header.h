@@ -18,6 +18,10 @@ std::optional<ImageSize> ParseImageSize(std::span<const std::byte> file);
 // Whether a PNG has one channel of 8 bits: gray without palette or alpha, as masks are written.
 bool IsGrayPng(std::span<const std::byte> file);
 
+// Whether a PNG has an alpha channel that the Python imaging library keeps when it opens the file:
+// RGB with alpha, and gray with alpha of 16 bits, but not of 8.
+bool HasAlphaForPython(std::span<const std::byte> file);
+
 // Whether a JPEG or PNG ends before its end marker (EOI, IEND). Decoders fill the rest of such a
 // JPEG with grey without a word. False for other formats. Bytes behind the end marker are allowed,
 // because phones append thumbnails and videos there.

@@ -93,6 +93,28 @@ RgbImage ReadRgbImage(const fs::path& path) {
   return image;
 }
 
+RgbImage ReadRgbImageOnWhite(const fs::path& path) {
+  const MappedFile file(path);
+  if (!HasAlphaForPython(file.bytes())) return ReadRgbImage(path);
+  cv::Mat bgra = Decode(path, file.bytes(), cv::IMREAD_UNCHANGED);
+  if (bgra.depth() == CV_16U) {
+    constexpr double kScale = 1.0 / 256;
+    bgra.convertTo(bgra, CV_8U, kScale, -127.5 * kScale);  // the upper byte; no tie to round
+  }
+  RgbImage image(bgra.cols, bgra.rows);
+  std::transform(bgra.begin<cv::Vec4b>(),
+                 bgra.end<cv::Vec4b>(),
+                 image.data().begin(),
+                 [](const cv::Vec4b& pixel) -> Rgb {
+                   const auto on_white = [&](int channel) {
+                     const int sum = pixel[channel] * pixel[3] + 255 * (255 - pixel[3]);
+                     return static_cast<uint8_t>((sum + 127) / 255);
+                   };
+                   return {on_white(2), on_white(1), on_white(0)};
+                 });
+  return image;
+}
+
 ImageSize ReadImageSize(const fs::path& path) {
   const MappedFile file(path);
   if (const auto size = ParseImageSize(file.bytes())) return *size;

@@ -28,6 +28,13 @@ struct ImageSize {
 // 2^30 pixels.
 RgbImage ReadRgbImage(const std::filesystem::path& path);
 
+// The same pixels on a white ground, as the loaders of the networks see them: where a PNG has an
+// alpha channel that the Python imaging library composites (RGB with alpha, 16-bit gray with
+// alpha), each channel is value * alpha + 255 * (1 - alpha), rounded; every other file reads as by
+// ReadRgbImage. Bit-equal to that library, but for TIFFs with alpha, gray PNGs of 16 bits, which it
+// turns white, and CMYK JPEGs, which differ by 1.
+RgbImage ReadRgbImageOnWhite(const std::filesystem::path& path);
+
 // Size from the file's header only where the format allows (JPEG, PNG), else by decoding.
 ImageSize ReadImageSize(const std::filesystem::path& path);
 

@@ -165,13 +165,40 @@ void CheckCoverage(const StoredTensors& tensors,
 }
 
 // Tensors in the order of their data: larger elements first keeps all of them aligned.
-std::vector<const StoredTensors::value_type*> DataOrder(const StoredTensors& tensors) {
-  std::vector<const StoredTensors::value_type*> order;
-  for (const auto& named : tensors) order.push_back(&named);
+std::vector<const TensorLayouts::value_type*> DataOrder(const TensorLayouts& layouts) {
+  std::vector<const TensorLayouts::value_type*> order;
+  for (const auto& named : layouts) order.push_back(&named);
   std::stable_sort(order.begin(), order.end(), [](const auto* a, const auto* b) {
     return SizeInBytes(a->second.type) > SizeInBytes(b->second.type);
   });
   return order;
+}
+
+// The JSON, padded to a multiple of 8 bytes.
+std::string HeaderFor(const std::vector<const TensorLayouts::value_type*>& order,
+                      const std::map<std::string, std::string>& metadata) {
+  Json header = Json::object();
+  if (!metadata.empty()) header[kMetadataKey] = metadata;
+  uint64_t offset = 0;
+  for (const auto* named : order) {
+    const auto& [name, layout] = *named;
+    VGTW_CHECK(name != kMetadataKey, "a tensor cannot have the metadata's name");
+    const auto num_bytes = NumBytes(layout.shape, SizeInBytes(layout.type));
+    VGTW_CHECK(num_bytes && *num_bytes <= std::numeric_limits<uint64_t>::max() - offset,
+               "tensor " + name + " is absurdly large");
+    header[name] = {{"dtype", TensorTypeName(layout.type)},
+                    {"shape", layout.shape},
+                    {"data_offsets", {offset, offset + *num_bytes}}};
+    offset += *num_bytes;
+  }
+  std::string text;
+  try {
+    text = header.dump();
+  } catch (const Json::exception& exception) {
+    throw std::invalid_argument(std::string("tensor names must be UTF-8: ") + exception.what());
+  }
+  text.resize((text.size() + 7) / 8 * 8, ' ');
+  return text;
 }
 
 }  // namespace
@@ -197,37 +224,43 @@ SafetensorsContent ParseSafetensors(std::span<const std::byte> bytes,
   return content;
 }
 
-void WriteSafetensors(const std::filesystem::path& path,
-                      const StoredTensors& tensors,
-                      const std::map<std::string, std::string>& metadata) {
-  const auto order = DataOrder(tensors);
-  Json header = Json::object();
-  if (!metadata.empty()) header[kMetadataKey] = metadata;
-  uint64_t offset = 0;
-  for (const auto* named : order) {
-    const auto& [name, tensor] = *named;
-    VGTW_CHECK(name != kMetadataKey, "a tensor cannot have the metadata's name");
-    VGTW_CHECK(NumBytes(tensor.shape, SizeInBytes(tensor.type)) == tensor.bytes.size(),
-               "bytes of tensor " + name + " do not fit its shape");
-    header[name] = {{"dtype", TensorTypeName(tensor.type)},
-                    {"shape", tensor.shape},
-                    {"data_offsets", {offset, offset + tensor.bytes.size()}}};
-    offset += tensor.bytes.size();
-  }
-  std::string text;
-  try {
-    text = header.dump();
-  } catch (const Json::exception& exception) {
-    throw std::invalid_argument(std::string("tensor names must be UTF-8: ") + exception.what());
-  }
-  text.resize((text.size() + 7) / 8 * 8, ' ');
-  const uint64_t length = text.size();
+void StreamSafetensors(const std::filesystem::path& path,
+                       const TensorLayouts& layouts,
+                       const TensorSource& source,
+                       const std::map<std::string, std::string>& metadata) {
+  const auto order = DataOrder(layouts);
+  const std::string header = HeaderFor(order, metadata);
+  const uint64_t length = header.size();
 
   AtomicFile file(path);
   file.Write(std::as_bytes(std::span(&length, 1)));
-  file.Write(text);
-  for (const auto* named : order) file.Write(named->second.bytes);
+  file.Write(header);
+  for (const auto* named : order) {
+    const auto& [name, layout] = *named;
+    uint64_t num_bytes = 0;
+    source(name, [&](std::span<const std::byte> bytes) {
+      num_bytes += bytes.size();
+      if (!bytes.empty()) file.Write(bytes);  // an empty span may be null, which fwrite forbids
+    });
+    VGTW_CHECK(num_bytes == NumBytes(layout.shape, SizeInBytes(layout.type)),
+               "bytes of tensor " + name + " do not fit its shape");
+  }
   file.Commit();
+}
+
+void WriteSafetensors(const std::filesystem::path& path,
+                      const StoredTensors& tensors,
+                      const std::map<std::string, std::string>& metadata) {
+  TensorLayouts layouts;
+  for (const auto& [name, tensor] : tensors) {
+    VGTW_CHECK(NumBytes(tensor.shape, SizeInBytes(tensor.type)) == tensor.bytes.size(),
+               "bytes of tensor " + name + " do not fit its shape");
+    layouts.emplace(name, TensorLayout{tensor.type, tensor.shape});
+  }
+  const TensorSource source = [&](const std::string& name, const ByteSink& sink) {
+    sink(tensors.find(name)->second.bytes);
+  };
+  StreamSafetensors(path, layouts, source, metadata);
 }
 
 std::vector<float> ToFloats(const StoredTensor& tensor) {

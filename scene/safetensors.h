@@ -66,6 +66,25 @@ void WriteSafetensors(const std::filesystem::path& path,
                       const StoredTensors& tensors,
                       const std::map<std::string, std::string>& metadata = {});
 
+// A tensor of a file to be written, before its bytes are there.
+struct TensorLayout {
+  TensorType type = TensorType::kF32;
+  std::vector<uint64_t> shape;
+};
+using TensorLayouts = std::map<std::string, TensorLayout, std::less<>>;
+
+using ByteSink = std::function<void(std::span<const std::byte> bytes)>;
+// Gives the bytes of tensor `name` to `sink`, in any number of pieces.
+using TensorSource = std::function<void(const std::string& name, const ByteSink& sink)>;
+
+// WriteSafetensors without holding the tensors: `source` is asked once for every tensor, in the
+// order of the data. Also throws std::invalid_argument if `source` gives another number of bytes
+// than the layout needs; what `source` throws passes through, and no file is left.
+void StreamSafetensors(const std::filesystem::path& path,
+                       const TensorLayouts& layouts,
+                       const TensorSource& source,
+                       const std::map<std::string, std::string>& metadata = {});
+
 // Values of an F64, F32, F16 or BF16 tensor, F64 rounded; std::invalid_argument for another type.
 std::vector<float> ToFloats(const StoredTensor& tensor);
 

@@ -64,6 +64,18 @@ TEST(IsGrayPng, IsOneChannelOf8Bits) {
   EXPECT_FALSE(IsGrayPng(Bytes(EncodedImage("a.jpg"))));
 }
 
+TEST(HasAlphaForPython, DependsOnTheColourType) {
+  const auto has_alpha = [](int bit_depth, int colour_type) {
+    return HasAlphaForPython(Bytes(MakePng(1, 1, bit_depth, colour_type, "")));
+  };
+  EXPECT_TRUE(has_alpha(8, 6));
+  EXPECT_TRUE(has_alpha(16, 6));
+  EXPECT_TRUE(has_alpha(16, 4));
+  EXPECT_FALSE(has_alpha(8, 4));
+  EXPECT_FALSE(has_alpha(8, 2));
+  EXPECT_FALSE(HasAlphaForPython({}));
+}
+
 TEST(IsTruncated, HoldsForEveryProperPrefix) {
   for (const std::string name : {"a.jpg", "a.png"}) {
     const std::string file = EncodedImage(name);

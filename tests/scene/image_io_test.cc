@@ -88,6 +88,40 @@ TEST(ReadRgbImage, DropsAlphaAndReadsOtherKindsOfPng) {
   EXPECT_EQ(ReadRgbImage(folder / "sixteen.png").data(), (std::vector<Rgb>{{128, 128, 128}}));
 }
 
+// value * alpha + 255 * (255 - alpha), over 255 and rounded: 132.02, 177.70, 127.00 at alpha 128,
+// 224.80, 205.00 at alpha 50.
+TEST(ReadRgbImageOnWhite, CompositesRgba) {
+  const TemporaryFolder folder;
+  const std::string row("\0\x0a\x14\x1e\0\x0a\x14\x1e\xff\x0a\x65\0\x80\x65\0\0\x32", 17);
+  WriteFileAtomically(folder / "rgba.png", MakePng(4, 1, 8, 6, row));
+  EXPECT_EQ(ReadRgbImageOnWhite(folder / "rgba.png").data(),
+            (std::vector<Rgb>{{255, 255, 255}, {10, 20, 30}, {132, 178, 127}, {225, 205, 205}}));
+  // Of 16 bits the upper 8 count, also for gray.
+  WriteFileAtomically(folder / "rgba16.png",
+                      MakePng(1, 1, 16, 6, std::string("\0\x65\xff\0\xff\0\xff\x32\xff", 9)));
+  EXPECT_EQ(ReadRgbImageOnWhite(folder / "rgba16.png").data(), (std::vector<Rgb>{{225, 205, 205}}));
+  WriteFileAtomically(folder / "gray_alpha16.png",
+                      MakePng(1, 1, 16, 4, std::string("\0\x65\x80\x32\x80", 5)));
+  EXPECT_EQ(ReadRgbImageOnWhite(folder / "gray_alpha16.png").data(),
+            (std::vector<Rgb>{{225, 225, 225}}));
+}
+
+// Where the Python library does not composite, alpha is dropped.
+TEST(ReadRgbImageOnWhite, ReadsOtherFilesAsReadRgbImage) {
+  const TemporaryFolder folder;
+  const std::string palette = PngChunk("PLTE", std::string("\0\0\0\x05\x06\x07", 6)) +
+                              PngChunk("tRNS", std::string("\0\x80", 2));
+  WriteFileAtomically(folder / "palette.png",
+                      MakePng(2, 1, 8, 3, std::string("\0\1\0", 3), palette));
+  WriteFileAtomically(folder / "gray_alpha.png", MakePng(1, 1, 8, 4, std::string("\0\x65\0", 3)));
+  WriteImage(folder / "photo.jpg", MakeRamp(40, 30));
+  for (const std::string name : {"palette.png", "gray_alpha.png", "photo.jpg"}) {
+    EXPECT_EQ(ReadRgbImageOnWhite(folder / name), ReadRgbImage(folder / name)) << name;
+  }
+  EXPECT_EQ(ReadRgbImageOnWhite(folder / "gray_alpha.png").data(),
+            (std::vector<Rgb>{{101, 101, 101}}));
+}
+
 TEST(ReadRgbImage, RefusesTruncatedFiles) {
   const TemporaryFolder folder;
   for (const std::string name : {"a.jpg", "a.png"}) {

@@ -106,6 +106,49 @@ TEST(Safetensors, EveryTypeSurvivesWriteReadWrite) {
   EXPECT_EQ(ReadFile(folder / "1"), ReadFile(folder / "2"));
 }
 
+TEST(Safetensors, StreamingGivesTheSameFile) {
+  const TemporaryFolder folder;
+  const std::string data = "0123456789abcdef";
+  const StoredTensors tensors = {{"a", {TensorType::kU8, {3}, AsBytes(data).first(3)}},
+                                 {"b", {TensorType::kF32, {2, 2}, AsBytes(data)}},
+                                 {"c", {TensorType::kF32, {0}, {}}}};
+  TensorLayouts layouts;
+  for (const auto& [name, tensor] : tensors) layouts[name] = {tensor.type, tensor.shape};
+  std::vector<std::string> asked;
+  const TensorSource by_bytes = [&](const std::string& name, const ByteSink& sink) {
+    asked.push_back(name);
+    const auto bytes = tensors.at(name).bytes;
+    for (size_t i = 0; i < bytes.size(); ++i) sink(bytes.subspan(i, 1));
+  };
+  StreamSafetensors(folder / "streamed", layouts, by_bytes, {{"key", "value"}});
+  EXPECT_THAT(asked, ElementsAre("b", "c", "a"));  // larger elements first
+  WriteSafetensors(folder / "written", tensors, {{"key", "value"}});
+  EXPECT_EQ(ReadFile(folder / "streamed"), ReadFile(folder / "written"));
+}
+
+TEST(Safetensors, StreamingRefusesOtherNumbersOfBytes) {
+  const TemporaryFolder folder;
+  const TensorLayouts layouts = {{"a", {TensorType::kF32, {2}}}};
+  for (const size_t num_bytes : {0u, 7u, 9u}) {
+    const std::string data(num_bytes, 'x');
+    EXPECT_THROW(
+        StreamSafetensors(folder / "a",
+                          layouts,
+                          [&](const std::string&, const ByteSink& sink) { sink(AsBytes(data)); }),
+        std::invalid_argument);
+  }
+  constexpr uint64_t kHuge = uint64_t{1} << 62;
+  const TensorSource none = [](const std::string&, const ByteSink&) {};
+  EXPECT_THROW(StreamSafetensors(folder / "a", {{"a", {TensorType::kF32, {kHuge}}}}, none),
+               std::invalid_argument);
+  EXPECT_THROW(
+      StreamSafetensors(folder / "a",
+                        {{"a", {TensorType::kU8, {kHuge}}}, {"b", {TensorType::kU8, {kHuge, 3}}}},
+                        none),
+      std::invalid_argument);
+  EXPECT_TRUE(Snapshot(folder.path()).empty());
+}
+
 TEST(Safetensors, EveryTruncationIsAnError) {
   const std::string file = File(R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,8]},)"
                                 R"("b":{"dtype":"U8","shape":[1],"data_offsets":[8,9]}})",

@@ -9,6 +9,10 @@ namespace vgtw {
 // absent. It is not part of the repository.
 std::filesystem::path SharedData();
 
+// The folder of what the reference networks gave, beside that of the photos (or $VGTW_PARITY_DIR),
+// or "" if it is absent. It is not part of the repository either.
+std::filesystem::path ParityData();
+
 }  // namespace vgtw
 
 // Skips the test with a printed reason where the photos are absent.
@@ -16,4 +20,11 @@ std::filesystem::path SharedData();
   if (::vgtw::SharedData().empty()) {                                   \
     GTEST_SKIP() << "real photos are absent: ../shared/data not found"; \
   }                                                                     \
+  static_assert(true)
+
+// The same for the outputs of the reference networks.
+#define VGTW_NEED_PARITY_DATA()                                                 \
+  if (::vgtw::ParityData().empty()) {                                           \
+    GTEST_SKIP() << "reference outputs are absent: ../shared/parity not found"; \
+  }                                                                             \
   static_assert(true)
