@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "scene/files.h"
+#include "scene/safetensors.h"
+
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace vgtw {
+
+// The weights of a network as a file holds them, told by its content and not by its extension:
+// .safetensors; model.safetensors.index.json, whose shards lie beside it; or what torch.save wrote
+// since torch 1.6 (.pt, .pth, .bin). Nothing in the file is ever executed.
+//
+// Names are those of the state dict: "module.", "model." and the like are dropped where all names
+// begin so. Of a training checkpoint only the weights are read (network/pickle_tensors.h).
+// Tensors are mapped, not read; only tensors of torch.save that are not row-major are copied, to at
+// most as many bytes as the file has. While this object lives the spans stay valid, and the files
+// must not shrink.
+class Checkpoint {
+ public:
+  // Throws Error if a file is unreadable, in another format, damaged, holds no tensors or refers to
+  // code; if shards lie outside the folder, or they and the index disagree.
+  explicit Checkpoint(const std::filesystem::path& path);
+
+  const StoredTensors& tensors() const { return tensors_; }
+  const std::map<std::string, std::string>& metadata() const { return metadata_; }
+  // "safetensors", "safetensors, 3 shards" or "torch.save".
+  const std::string& format() const { return format_; }
+
+ private:
+  std::span<const std::byte> Map(const std::filesystem::path& path);
+  void ReadSafetensors(std::span<const std::byte> bytes, const std::filesystem::path& path);
+  void ReadShards(std::span<const std::byte> index, const std::filesystem::path& path);
+
+  std::vector<std::unique_ptr<MappedFile>> files_;
+  std::vector<std::vector<std::byte>> copies_;
+  StoredTensors tensors_;
+  std::map<std::string, std::string> metadata_;
+  std::string format_;
+};
+
+}  // namespace vgtw
