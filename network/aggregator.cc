@@ -30,6 +30,10 @@ at::Tensor ExcludedTokens(const at::Tensor& excluded_patches) {
       1);
 }
 
+at::Tensor GlobalInputOf(const at::Tensor& tokens) {
+  return tokens.slice(2, 0, tokens.size(2) / 2).reshape({1, -1, tokens.size(2) / 2});
+}
+
 Aggregator::Aggregator(const ParameterScope& scope, const VggtConfig& config)
     : head_dim_(config.dim / config.num_heads),
       camera_token_(scope.Get("camera_token", {1, 2, 1, config.dim})),
@@ -58,6 +62,20 @@ at::Tensor Aggregator::Embed(const at::Tensor& images) const {
                   ForFirstAndOthers(registers_, num_views),
                   AtLeastFloat(patches)},
                  1);
+}
+
+at::Tensor Aggregator::GlobalAttentionOf(int64_t view,
+                                         int64_t token,
+                                         int64_t layer,
+                                         const at::Tensor& tokens,
+                                         int64_t height,
+                                         int64_t width) const {
+  const at::Tensor frame = GlobalInputOf(tokens);
+  const RotaryTable rotary = MakeRotaryTable(
+      kNumSpecialTokens, height / kPatchSize, width / kPatchSize, head_dim_, frame.device());
+  return global_blocks_.at(static_cast<size_t>(layer))
+      .AttentionWeightsOf(view * tokens.size(1) + token, frame, &rotary)
+      .view({tokens.size(0), tokens.size(1)});
 }
 
 void Aggregator::operator()(const at::Tensor& images,

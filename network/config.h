@@ -39,7 +39,7 @@ struct VggtConfig {
   int64_t num_heads = 16;
   int64_t num_camera_heads = 16;  // attention heads of the camera head
   std::array<int64_t, 4> head_layers = {4, 11, 17, 23};
-  DptConfig dpt;
+  DptConfig dpt = {};
   // Both for VGTW; the distractor head has the official prefix "mask_head".
   std::optional<LoraConfig> lora = {};
   bool has_distractor_head = false;
@@ -55,7 +55,7 @@ struct Pi3Config {
   std::optional<LoraConfig> lora = {};
   bool has_distractor_head = false;
   std::array<int64_t, 4> head_layers = {3, 8, 13, 17};
-  DptConfig dpt;
+  DptConfig dpt = {};
 };
 
 }  // namespace vgtw

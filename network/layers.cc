@@ -4,6 +4,8 @@
 #include "network/attention.h"
 #include "scene/error.h"
 
+#include <cmath>
+
 #include <ATen/ATen.h>
 
 namespace vgtw {
@@ -90,9 +92,7 @@ at::Tensor Attention::Update(const Lora& lora, const at::Tensor& x) const {
   return ToHeads(at::linear(reduced, lora.up)) * lora_scale_;
 }
 
-at::Tensor Attention::operator()(const at::Tensor& x,
-                                 const RotaryTable* rotary,
-                                 const at::Tensor& excluded_keys) const {
+Attention::Projections Attention::Project(const at::Tensor& x, const RotaryTable* rotary) const {
   const std::vector<at::Tensor> parts = qkv_(x).chunk(3, 2);
   at::Tensor q = ToHeads(parts[0]);
   at::Tensor k = ToHeads(parts[1]);
@@ -107,8 +107,25 @@ at::Tensor Attention::operator()(const at::Tensor& x,
   // After norm and rotation, as the released weights were trained: it cannot be merged into qkv.
   if (lora_q_) q = q + Update(*lora_q_, x);
   if (lora_v_) v = v + Update(*lora_v_, x);
-  const at::Tensor attended = Attend(q.to(product_type), k.to(product_type), v, excluded_keys);
+  return {q.to(product_type), k.to(product_type), v};
+}
+
+at::Tensor Attention::operator()(const at::Tensor& x,
+                                 const RotaryTable* rotary,
+                                 const at::Tensor& excluded_keys) const {
+  const Projections heads = Project(x, rotary);
+  const at::Tensor attended = Attend(heads.q, heads.k, heads.v, excluded_keys);
   return proj_(attended.transpose(1, 2).reshape(x.sizes()));
+}
+
+at::Tensor Attention::WeightsOf(int64_t query,
+                                const at::Tensor& x,
+                                const RotaryTable* rotary) const {
+  const Projections heads = Project(x, rotary);
+  const at::Tensor q = AtLeastFloat(heads.q[0].slice(1, query, query + 1));  // [heads, 1, d]
+  const at::Tensor k = AtLeastFloat(heads.k[0]);
+  const double scale = 1.0 / std::sqrt(static_cast<double>(q.size(2)));
+  return at::softmax(at::bmm(q, k.transpose(1, 2)) * scale, 2).mean(0).squeeze(0);
 }
 
 TransformerBlock::TransformerBlock(const ParameterScope& scope, const BlockConfig& config)

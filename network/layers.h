@@ -93,12 +93,18 @@ class Attention {
   at::Tensor operator()(const at::Tensor& x,
                         const RotaryTable* rotary,
                         const at::Tensor& excluded_keys = {}) const;
+  // How much token `query` of x [1, N, dim] attends to each token: [N], mean over the heads.
+  at::Tensor WeightsOf(int64_t query, const at::Tensor& x, const RotaryTable* rotary) const;
 
  private:
+  struct Projections {
+    at::Tensor q, k, v;  // [B, heads, N, dim / heads], one type
+  };
   struct Lora {
     at::Tensor down;  // A [rank, dim]
     at::Tensor up;    // B [dim, rank]
   };
+  Projections Project(const at::Tensor& x, const RotaryTable* rotary) const;
   at::Tensor ToHeads(const at::Tensor& x) const;  // [B, N, dim] -> [B, heads, N, dim / heads]
   at::Tensor Update(const Lora& lora, const at::Tensor& x) const;
 
@@ -126,6 +132,12 @@ class TransformerBlock {
   at::Tensor operator()(const at::Tensor& x,
                         const RotaryTable* rotary = nullptr,
                         const at::Tensor& excluded_keys = {}) const;
+  // The attention inside this block, see Attention::WeightsOf.
+  at::Tensor AttentionWeightsOf(int64_t query,
+                                const at::Tensor& x,
+                                const RotaryTable* rotary) const {
+    return attention_.WeightsOf(query, norm1_(x), rotary);
+  }
 
  private:
   LayerNorm norm1_;

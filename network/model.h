@@ -56,6 +56,15 @@ class Model {
   // Maps of the views begin .. end - 1: no view needs the others, so few at a time bound the
   // memory.
   virtual DenseOutputs PredictMaps(const Features& features, int64_t begin, int64_t end) const = 0;
+  // How much token `token` of view `view` attends to every token of all views in the global block
+  // of `layer`: [S, 5 + P], mean over the heads, sum 1. `tokens` [S, 5 + P, 2 E] are that layer's,
+  // as EncodeOptions::on_layer gave them, of an image of height x width pixels.
+  virtual at::Tensor GlobalAttentionOf(int64_t view,
+                                       int64_t token,
+                                       int64_t layer,
+                                       const at::Tensor& tokens,
+                                       int64_t height,
+                                       int64_t width) const = 0;
 };
 
 // The four layers of the views begin .. end - 1.

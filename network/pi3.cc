@@ -174,4 +174,20 @@ DenseOutputs Pi3::PredictMaps(const Features& features, int64_t begin, int64_t e
   return outputs;
 }
 
+at::Tensor Pi3::GlobalAttentionOf(int64_t view,
+                                  int64_t token,
+                                  int64_t layer,
+                                  const at::Tensor& tokens,
+                                  int64_t height,
+                                  int64_t width) const {
+  const RotaryTable rotary = MakeRotaryTable(kNumSpecialTokens,
+                                             height / kPatchSize,
+                                             width / kPatchSize,
+                                             config_.encoder.dim / config_.encoder.num_heads,
+                                             tokens.device());
+  return decoder_.at(static_cast<size_t>(2 * layer + 1))
+      .AttentionWeightsOf(view * tokens.size(1) + token, GlobalInputOf(tokens), &rotary)
+      .view({tokens.size(0), tokens.size(1)});
+}
+
 }  // namespace vgtw

@@ -82,4 +82,13 @@ DenseOutputs Vggt::PredictMaps(const Features& features, int64_t begin, int64_t 
   return outputs;
 }
 
+at::Tensor Vggt::GlobalAttentionOf(int64_t view,
+                                   int64_t token,
+                                   int64_t layer,
+                                   const at::Tensor& tokens,
+                                   int64_t height,
+                                   int64_t width) const {
+  return aggregator_.GlobalAttentionOf(view, token, layer, tokens, height, width);
+}
+
 }  // namespace vgtw

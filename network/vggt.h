@@ -25,6 +25,13 @@ class Vggt : public Model {
   CameraOutputs PredictCameras(const Features& features) const override;
   DenseOutputs PredictMaps(const Features& features, int64_t begin, int64_t end) const override;
 
+  at::Tensor GlobalAttentionOf(int64_t view,
+                               int64_t token,
+                               int64_t layer,
+                               const at::Tensor& tokens,
+                               int64_t height,
+                               int64_t width) const override;
+
   const Aggregator& aggregator() const { return aggregator_; }
 
  private:

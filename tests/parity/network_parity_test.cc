@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Our networks against what the official ones gave, tensor by tensor, intermediate tokens included.
 // Prints "worst <fixture>.<case> <tensor> <ratio to tolerance>". VGTW_PARITY_DIR names another
-// folder of fixtures; VGTW_PARITY_FULL=1 adds the networks of published size (6 GB of memory).
+// folder of fixtures. The networks of published size need 6 GB of memory.
+#include "network/vggt.h"
 #include "tests/parity/parity_fixture.h"
+#include "tests/parity/parity_formula.h"
 #include "tests/support/shared_data.h"
 
+#include <algorithm>
 #include <cstdio>
-#include <cstdlib>
+#include <functional>
 
 #include <ATen/ATen.h>
 #include <gtest/gtest.h>
@@ -80,6 +83,79 @@ TEST(NetworkParity, SmallNetworksMeetEveryTensor) {
   const std::vector<ParityCase> cases = ReadParityCases(ParityData(), /*is_full=*/false);
   ASSERT_FALSE(cases.empty());
   for (const ParityCase& parity_case : cases) TestCase(parity_case);
+}
+
+// A change of the weights or the configuration that amounts to a mistake in the code.
+struct Mistake {
+  std::string name;
+  std::function<void(ParityCase&)> configure = {};
+  std::function<void(const std::string&, at::Tensor&)> change_weight = {};
+};
+
+class MistakenSource : public FormulaSource {
+ public:
+  explicit MistakenSource(const Mistake& mistake) : mistake_(mistake) {}
+  at::Tensor Get(const std::string& name, const Shape& shape, at::ScalarType type) override {
+    at::Tensor weight = FormulaSource::Get(name, shape, type);
+    if (mistake_.change_weight) mistake_.change_weight(name, weight);
+    return weight;
+  }
+
+ private:
+  const Mistake& mistake_;
+};
+
+// q gets its update before norm and rotation, as if it were part of qkv.
+void MergeLora(const std::string& name, at::Tensor& weight) {
+  const std::string leaf = ".qkv.weight";
+  if (!name.ends_with(leaf) || name.find("patch_embed") != std::string::npos) return;
+  const std::string attention = name.substr(0, name.size() - leaf.size());
+  const int64_t dim = weight.size(1);
+  const auto of_formula = [&](const char* which, const Shape& shape) {
+    return at::tensor(ParityWeights(attention + which, shape)).view(shape);
+  };
+  const auto update = [&](const char* up, const char* down) {
+    return at::mm(of_formula(up, {dim, 4}), of_formula(down, {4, dim})) * 0.5;
+  };
+  weight.slice(0, 0, dim).add_(update(".lora_B_q", ".lora_A_q"));
+  weight.slice(0, 2 * dim).add_(update(".lora_B_v", ".lora_A_v"));
+}
+
+void SwapFirstAndOthers(const std::string& name, at::Tensor& weight) {
+  if (name.ends_with("camera_token") || name.ends_with("register_token")) weight = weight.flip(1);
+}
+
+VggtConfig& VggtOf(ParityCase& parity_case) { return std::get<VggtConfig>(parity_case.config); }
+
+TEST(NetworkParity, MistakesAreCaught) {
+  VGTW_NEED_PARITY_DATA();
+  const at::NoGradGuard no_gradient;
+  const std::vector<Mistake> mistakes = {
+      {"LoRA merged into qkv", [](ParityCase& c) { VggtOf(c).lora.reset(); }, MergeLora},
+      {"LoRA scaled by 1", [](ParityCase& c) { VggtOf(c).lora->alpha = 4.0; }},
+      {"first view's tokens swapped", {}, SwapFirstAndOthers},
+      {"heads of 24 channels", [](ParityCase& c) { VggtOf(c).num_camera_heads = 2; }},
+      {"layers off by one", [](ParityCase& c) {
+         VggtOf(c).head_layers = {0, 1, 3, 4};
+       }}};
+  for (ParityCase parity_case : ReadParityCases(ParityData(), /*is_full=*/false)) {
+    if (parity_case.Label() != "vgtw_dino.a") continue;
+    const auto expected = ReadParityTensors(ParityData() / "vgtw_dino.a.safetensors");
+    for (const Mistake& mistake : mistakes) {
+      ParityCase mistaken = parity_case;
+      if (mistake.configure) mistake.configure(mistaken);
+      MistakenSource source(mistake);
+      const Vggt network(ParameterScope(source), VggtOf(mistaken));
+      const auto outputs = RunParityCase(mistaken, network);
+      double worst = 0.0;
+      for (const char* name : {"pose_enc", "depth", "depth_mask"}) {
+        worst = std::max(worst, RatioToTolerance(outputs.at(name), expected.at(name)));
+      }
+      std::printf("mistake \"%s\" %.0f\n", mistake.name.c_str(), worst);
+      EXPECT_GT(worst, 1.0) << mistake.name;
+    }
+    return;
+  }
 }
 
 TEST(NetworkParity, PublishedSizesMeetEveryTensor) {
