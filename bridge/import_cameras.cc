@@ -39,24 +39,6 @@ std::vector<double> ParseCameraParams(std::string_view text) {
 
 }  // namespace
 
-std::optional<Camera> CameraFromNetwork(const Eigen::Matrix3d& network_intrinsics,
-                                        const NetworkGeometry& geometry,
-                                        const ImageSize& photo_size) {
-  const Eigen::Matrix3d& k = network_intrinsics;
-  constexpr double kTolerance = 1e-3;
-  if (!k.allFinite() || k(0, 0) <= 0.0 || k(1, 1) <= 0.0) return std::nullopt;
-  if (std::abs(k(0, 1)) > kTolerance * k(0, 0) || std::abs(k(1, 0)) > kTolerance * k(1, 1) ||
-      !k.row(2).isApprox(Eigen::RowVector3d(0.0, 0.0, 1.0), kTolerance)) {
-    return std::nullopt;
-  }
-  const PixelMap& map = geometry.original_from_network;
-  Camera camera =
-      MakePinhole(photo_size.width, photo_size.height, map(0, 0) * k(0, 0), map(1, 1) * k(1, 1));
-  camera.SetPrincipalPoint(Apply(map, {k(0, 2), k(1, 2)}));
-  camera.has_prior_focal_length = true;
-  return camera;
-}
-
 bool IsResized(const ImageSize& from, const ImageSize& size) {
   if (from.width == 0 || from.height == 0 || size.width == 0 || size.height == 0) return false;
   const auto deviation = [](uint64_t from_a, uint64_t from_b, uint64_t a, uint64_t b) {

@@ -15,14 +15,6 @@
 
 namespace vgtw {
 
-// Intrinsics in network pixels as an exact PINHOLE of the original ones:
-//   pixel_in_original = original_from_network * K * ray.
-// K has its principal point in continuous pixels (a centred lens has cx = W / 2). nullopt if K is
-// not finite, has skew or a wrong last row, or a focal length <= 0.
-std::optional<Camera> CameraFromNetwork(const Eigen::Matrix3d& network_intrinsics,
-                                        const NetworkGeometry& geometry,
-                                        const ImageSize& photo_size);
-
 // Whether `size` is `from` resized with its aspect, up to rounding to whole pixels.
 bool IsResized(const ImageSize& from, const ImageSize& size);
 

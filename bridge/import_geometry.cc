@@ -167,11 +167,4 @@ ResolvedResize ResolveResize(const std::filesystem::path& path,
   return resolved;
 }
 
-bool IsOnPhoto(const NetworkGeometry& geometry, const ImageSize& size, int x, int y) {
-  const Eigen::Vector2d pixel =
-      Apply(geometry.original_from_network, Eigen::Vector2d(x + 0.5, y + 0.5));
-  return pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() <= static_cast<double>(size.width) &&
-         pixel.y() <= static_cast<double>(size.height);
-}
-
 }  // namespace vgtw

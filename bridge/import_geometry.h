@@ -43,7 +43,4 @@ ResolvedResize ResolveResize(const std::filesystem::path& path,
                              const std::vector<MapSize>& map_sizes,
                              ImportResize requested);
 
-// Whether the centre of a network pixel lies on the photo (bars and padding do not).
-bool IsOnPhoto(const NetworkGeometry& geometry, const ImageSize& size, int x, int y);
-
 }  // namespace vgtw

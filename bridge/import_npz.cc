@@ -5,10 +5,9 @@
 #include "bridge/importer.h"
 #include "bridge/npz.h"
 #include "scene/error.h"
+#include "scene/network_pixels.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <tuple>
 #include <utility>
 
@@ -16,23 +15,6 @@ namespace vgtw {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
-
-// Bars and padding hold values too, but no photo is below them.
-void ForgetBars(const NetworkGeometry& geometry,
-                const ImageSize& size,
-                ViewPrediction& prediction) {
-  for (int y = 0; y < geometry.network_height; ++y) {
-    for (int x = 0; x < geometry.network_width; ++x) {
-      if (IsOnPhoto(geometry, size, x, y)) continue;
-      if (!prediction.depth.empty()) prediction.depth(x, y) = kUnknown;
-      if (!prediction.depth_conf.empty()) prediction.depth_conf(x, y) = kUnknown;
-      if (!prediction.distractor.empty()) prediction.distractor(x, y) = kUnknown;
-      if (!prediction.points.empty()) prediction.points(x, y).setConstant(kUnknown);
-    }
-  }
-}
 
 // A coarse grid of the point map.
 std::vector<Anchor> MakeAnchors(const NetworkGeometry& geometry,
@@ -101,7 +83,7 @@ class ArrayImport {
     prediction.depth_conf = std::move(arrays.depth_conf);
     prediction.distractor = std::move(arrays.distractor);
     prediction.points = std::move(arrays.points);
-    ForgetBars(geometry, photo.size, prediction);
+    ForgetBars(prediction);
     imported.anchors = MakeAnchors(geometry, prediction.points);
     sink_(std::move(imported));
   }

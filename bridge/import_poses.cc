@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/import_poses.h"
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
-
 namespace vgtw {
 namespace {
 
@@ -33,19 +30,6 @@ Rigid3d CamFromWorld(const FilePose& pose, const ConventionRepair& repair) {
   const Rigid3d opencv_from_opengl = {Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0),
                                       Eigen::Vector3d::Zero()};
   return opencv_from_opengl * transform;
-}
-
-std::optional<Rigid3d> RigidFromMatrix(const Eigen::Matrix<double, 3, 4>& matrix) {
-  if (!matrix.allFinite()) return std::nullopt;
-  constexpr double kTolerance = 1e-2;
-  const Eigen::Matrix3d read = matrix.leftCols<3>();
-  const bool is_rotation =
-      (read * read.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kTolerance &&
-      read.determinant() > 0.0;
-  if (!is_rotation) return std::nullopt;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(read, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
-  return Rigid3d{Eigen::Quaterniond(rotation).normalized(), matrix.col(3)};
 }
 
 std::string OptionsText(const ConventionRepair& repair) {

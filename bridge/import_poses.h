@@ -4,10 +4,7 @@
 #include "bridge/import.h"
 #include "scene/rigid3d.h"
 
-#include <optional>
 #include <string>
-
-#include <Eigen/Core>
 
 namespace vgtw {
 
@@ -25,10 +22,6 @@ struct FilePose {
 // the other order; the transform is taken for its opposite; the camera's axes are turned from
 // (x right, y up, z backwards) to ours. swap_quaternion_order does nothing to matrices.
 Rigid3d CamFromWorld(const FilePose& pose, const ConventionRepair& repair);
-
-// The nearest rigid motion to [R|t]; nullopt if R is no rotation within 1 % (float16 keeps 0.1 %),
-// or something is not finite.
-std::optional<Rigid3d> RigidFromMatrix(const Eigen::Matrix<double, 3, 4>& matrix);
 
 // "--invert_poses --opengl_axes": the options that ask for these repairs, or "".
 std::string OptionsText(const ConventionRepair& repair);

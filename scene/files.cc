@@ -219,6 +219,13 @@ MappedFile::~MappedFile() {
   if (!bytes_.empty()) ::munmap(const_cast<std::byte*>(bytes_.data()), bytes_.size());
 }
 
+void MappedFile::ReleasePages() const {
+  // Nothing is lost, because nothing can be written to the mapping.
+  if (!bytes_.empty()) {
+    ::madvise(const_cast<std::byte*>(bytes_.data()), bytes_.size(), MADV_DONTNEED);
+  }
+}
+
 bool IsSafeRelativeName(std::string_view name) {
   constexpr size_t kMaxLength = 1024;
   if (name.empty() || name.size() > kMaxLength || name.front() == '/') return false;

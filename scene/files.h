@@ -70,6 +70,9 @@ class MappedFile {
 
   std::span<const std::byte> bytes() const { return bytes_; }
 
+  // Gives back the memory of what was read so far; what is touched again is read again.
+  void ReleasePages() const;
+
  private:
   std::span<const std::byte> bytes_;
 };

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <numbers>
 
+#include <Eigen/LU>
+#include <Eigen/SVD>
+
 namespace vgtw {
 
 Eigen::Matrix<double, 3, 4> Rigid3d::ToMatrix() const {
@@ -23,6 +26,19 @@ Rigid3d operator*(const Rigid3d& c_from_b, const Rigid3d& b_from_a) {
 Rigid3d Inverse(const Rigid3d& b_from_a) {
   const Eigen::Quaterniond inverse = b_from_a.rotation.conjugate();
   return {inverse, -(inverse * b_from_a.translation)};
+}
+
+std::optional<Rigid3d> RigidFromMatrix(const Eigen::Matrix<double, 3, 4>& matrix) {
+  if (!matrix.allFinite()) return std::nullopt;
+  constexpr double kTolerance = 1e-2;
+  const Eigen::Matrix3d read = matrix.leftCols<3>();
+  const bool is_rotation =
+      (read * read.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kTolerance &&
+      read.determinant() > 0.0;
+  if (!is_rotation) return std::nullopt;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(read, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
+  return Rigid3d{Eigen::Quaterniond(rotation).normalized(), matrix.col(3)};
 }
 
 std::string FindFault(const Rigid3d& b_from_a) {

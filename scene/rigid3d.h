@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <Eigen/Core>
@@ -25,6 +26,10 @@ Rigid3d operator*(const Rigid3d& c_from_b, const Rigid3d& b_from_a);
 
 // a_from_b from b_from_a.
 Rigid3d Inverse(const Rigid3d& b_from_a);
+
+// The nearest rigid motion to [R|t]; nullopt if R is no rotation within 1 % (float16 keeps 0.1 %),
+// or something is not finite.
+std::optional<Rigid3d> RigidFromMatrix(const Eigen::Matrix<double, 3, 4>& matrix);
 
 // Why the motion cannot be used (not finite, quaternion not of unit length to 1e-6), or "".
 std::string FindFault(const Rigid3d& b_from_a);

@@ -53,10 +53,6 @@ TEST(ResolveResize, BatchOfTwoShapesIsPaddedToTheTallest) {
   EXPECT_EQ(resolved.warning, "");
   ExpectMaps(resolved.geometries[1], {0, 49}, {0, 0});
   ExpectMaps(resolved.geometries[1], {518, 343}, {1280, 720});
-  EXPECT_FALSE(IsOnPhoto(resolved.geometries[1], {1280, 720}, 0, 48));
-  EXPECT_TRUE(IsOnPhoto(resolved.geometries[1], {1280, 720}, 0, 49));
-  EXPECT_TRUE(IsOnPhoto(resolved.geometries[1], {1280, 720}, 517, 342));
-  EXPECT_FALSE(IsOnPhoto(resolved.geometries[1], {1280, 720}, 517, 343));
 }
 
 TEST(ResolveResize, PortraitPhotosAreTakenAsCroppedWithAWarning) {

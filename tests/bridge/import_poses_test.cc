@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/import_poses.h"
 
-#include <cmath>
-#include <limits>
-
 #include <gtest/gtest.h>
 
 namespace vgtw {
@@ -58,26 +55,6 @@ TEST(CamFromWorld, MendsAllMistakesAtOnce) {
   const Rigid3d read = {{q.x(), q.y(), q.z(), q.w()}, written.translation};
   ExpectSame(CamFromWorld({read, false, RotationForm::kQuaternionWxyz}, {true, true, true}),
              Sample());
-}
-
-TEST(RigidFromMatrix, RoundsToTheNearestRotation) {
-  Eigen::Matrix<double, 3, 4> matrix = Sample().ToMatrix();
-  ExpectSame(*RigidFromMatrix(matrix), Sample());
-  matrix(0, 0) += 1e-3;
-  EXPECT_LT(AngleBetweenDeg(RigidFromMatrix(matrix)->rotation, Sample().rotation), 0.1);
-}
-
-TEST(RigidFromMatrix, OtherMatricesGiveNone) {
-  Eigen::Matrix<double, 3, 4> scaled = Sample().ToMatrix();
-  scaled.leftCols<3>() *= 1.1;
-  EXPECT_FALSE(RigidFromMatrix(scaled));
-  Eigen::Matrix<double, 3, 4> mirrored = Sample().ToMatrix();
-  mirrored.row(1) *= -1.0;
-  EXPECT_FALSE(RigidFromMatrix(mirrored));
-  Eigen::Matrix<double, 3, 4> unknown = Sample().ToMatrix();
-  unknown(2, 3) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(RigidFromMatrix(unknown));
-  EXPECT_FALSE(RigidFromMatrix(Eigen::Matrix<double, 3, 4>::Zero()));
 }
 
 TEST(OptionsText, NamesTheOptions) {

@@ -350,6 +350,30 @@ TEST(MappedFile, HoldsTheBytes) {
   EXPECT_EQ(file.bytes()[3], std::byte{'t'});
 }
 
+// Bytes of files that this process has in its memory.
+size_t NumResidentFileBytes() {
+  size_t num_pages = 0;
+  std::ifstream("/proc/self/statm") >> num_pages >> num_pages >> num_pages;
+  return num_pages * static_cast<size_t>(::sysconf(_SC_PAGESIZE));
+}
+
+TEST(MappedFile, ReleasedPagesLeaveTheMemoryAndComeBack) {
+  const TemporaryFolder folder;
+  constexpr size_t kNumBytes = size_t{16} << 20;
+  WriteFileAtomically(folder / "a", std::string(kNumBytes, 'x'));
+  WriteFileAtomically(folder / "empty", "");
+  const MappedFile file(folder / "a");
+  const auto count = [&] {
+    return std::count(file.bytes().begin(), file.bytes().end(), std::byte{'x'});
+  };
+  EXPECT_EQ(count(), kNumBytes);
+  const size_t before = NumResidentFileBytes();
+  file.ReleasePages();
+  EXPECT_LE(NumResidentFileBytes(), before - kNumBytes * 9 / 10);
+  EXPECT_EQ(count(), kNumBytes);
+  MappedFile(folder / "empty").ReleasePages();
+}
+
 TEST(IsSafeRelativeName, StaysInsideItsFolder) {
   for (const char* name : {"a", "a.png", "a b/c.d", "..a/b..", "\xc3\xa4/x.jpg"}) {
     EXPECT_TRUE(IsSafeRelativeName(name)) << name;

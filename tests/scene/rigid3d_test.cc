@@ -97,5 +97,27 @@ TEST(Rigid3d, FaultsAreNamed) {
   EXPECT_EQ(FindFault(bad), "the translation is not finite");
 }
 
+TEST(RigidFromMatrix, RoundsToTheNearestRotation) {
+  const Rigid3d truth = RandomRigid();
+  Eigen::Matrix<double, 3, 4> matrix = truth.ToMatrix();
+  EXPECT_LT((RigidFromMatrix(matrix)->ToMatrix() - matrix).cwiseAbs().maxCoeff(), kRounding);
+  matrix(0, 0) += 1e-3;
+  EXPECT_LT(AngleBetweenDeg(RigidFromMatrix(matrix)->rotation, truth.rotation), 0.1);
+}
+
+TEST(RigidFromMatrix, OtherMatricesGiveNone) {
+  const Eigen::Matrix<double, 3, 4> truth = RandomRigid().ToMatrix();
+  Eigen::Matrix<double, 3, 4> scaled = truth;
+  scaled.leftCols<3>() *= 1.1;
+  EXPECT_FALSE(RigidFromMatrix(scaled));
+  Eigen::Matrix<double, 3, 4> mirrored = truth;
+  mirrored.row(1) *= -1.0;
+  EXPECT_FALSE(RigidFromMatrix(mirrored));
+  Eigen::Matrix<double, 3, 4> unknown = truth;
+  unknown(2, 3) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(RigidFromMatrix(unknown));
+  EXPECT_FALSE(RigidFromMatrix(Eigen::Matrix<double, 3, 4>::Zero()));
+}
+
 }  // namespace
 }  // namespace vgtw
