@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <ATen/ATen.h>
 #if __has_include(<ATen/ops/scaled_dot_product_attention.h>)
@@ -55,9 +56,8 @@ at::Tensor Attend(const at::Tensor& q,
                   const at::Tensor& excluded_keys) {
   const at::Tensor bias = LogitBias(excluded_keys, q.scalar_type());
 #ifdef VGTW_HAS_FUSED_ATTENTION
-  c10::optional<at::Tensor> mask;
-  if (bias.defined()) mask = bias;
-  return at::scaled_dot_product_attention(q, k, v, mask);
+  if (bias.defined()) return at::scaled_dot_product_attention(q, k, v, bias);
+  return at::scaled_dot_product_attention(q, k, v);
 #else
   const int64_t num_at_once = q.is_cpu() ? 1 : q.size(1);
   std::vector<at::Tensor> batches;

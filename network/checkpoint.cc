@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <iterator>
 #include <string_view>
 #include <utility>
 
@@ -109,6 +110,26 @@ Checkpoint::Checkpoint(const std::filesystem::path& path) {
   if (tensors_.contains("__metadata__")) {
     Fail(path, "has a tensor '__metadata__'", "other names, as safetensors reserves this one");
   }
+}
+
+void Checkpoint::Overlay(Checkpoint other) {
+  std::move(other.files_.begin(), other.files_.end(), std::back_inserter(files_));
+  std::move(other.copies_.begin(), other.copies_.end(), std::back_inserter(copies_));
+  other.tensors_.merge(tensors_);  // keeps what it has
+  tensors_ = std::move(other.tensors_);
+  other.metadata_.merge(metadata_);
+  metadata_ = std::move(other.metadata_);
+  format_ += " + " + other.format_;
+}
+
+void Checkpoint::ReleasePages() const {
+  for (const auto& file : files_) file->ReleasePages();
+}
+
+void PageLimiter::AddRead(size_t num_bytes) {
+  constexpr size_t kMaxBytes = size_t{256} << 20;
+  const size_t before = num_bytes_.fetch_add(num_bytes);
+  if (before / kMaxBytes != (before + num_bytes) / kMaxBytes) checkpoint_.ReleasePages();
 }
 
 std::span<const std::byte> Checkpoint::Map(const std::filesystem::path& path) {

@@ -4,6 +4,7 @@
 #include "scene/files.h"
 #include "scene/safetensors.h"
 
+#include <atomic>
 #include <cstddef>
 #include <filesystem>
 #include <map>
@@ -31,8 +32,15 @@ class Checkpoint {
 
   const StoredTensors& tensors() const { return tensors_; }
   const std::map<std::string, std::string>& metadata() const { return metadata_; }
-  // "safetensors", "safetensors, 3 shards" or "torch.save".
+  // "safetensors", "safetensors, 3 shards" or "torch.save"; " + " between those of overlays.
   const std::string& format() const { return format_; }
+
+  // Takes the tensors and metadata of `other`; where both have a name, what `other` has stays.
+  void Overlay(Checkpoint other);
+
+  // Gives back the memory of what was read of the files so far; what is touched again is read
+  // again.
+  void ReleasePages() const;
 
  private:
   std::span<const std::byte> Map(const std::filesystem::path& path);
@@ -44,6 +52,18 @@ class Checkpoint {
   StoredTensors tensors_;
   std::map<std::string, std::string> metadata_;
   std::string format_;
+};
+
+// Keeps the memory small of who reads all of a checkpoint once, with any number of threads.
+class PageLimiter {
+ public:
+  explicit PageLimiter(const Checkpoint& checkpoint) : checkpoint_(checkpoint) {}
+  // To be called after `num_bytes` were read: releases all pages whenever these are 256 MiB.
+  void AddRead(size_t num_bytes);
+
+ private:
+  const Checkpoint& checkpoint_;
+  std::atomic<size_t> num_bytes_ = 0;
 };
 
 }  // namespace vgtw

@@ -132,6 +132,7 @@ void ConvertCheckpoint(const Checkpoint& checkpoint,
   TensorLayouts layouts;
   int64_t num_bytes = 0;
   int64_t num_bytes_done = 0;
+  PageLimiter limiter(checkpoint);
   for (const auto& [name, tensor] : checkpoint.tensors()) {
     layouts[name] = {IsFloating(tensor.type) ? float_type : tensor.type, tensor.shape};
     num_bytes += static_cast<int64_t>(tensor.bytes.size());
@@ -147,6 +148,7 @@ void ConvertCheckpoint(const Checkpoint& checkpoint,
            "values in its range",
            "convert to BF16 or F32");
     }
+    limiter.AddRead(tensor.bytes.size());
     num_bytes_done += static_cast<int64_t>(tensor.bytes.size());
     if (progress) progress(num_bytes_done, num_bytes);
   };

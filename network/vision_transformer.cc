@@ -36,8 +36,8 @@ at::Tensor ResizePositions(const at::Tensor& positions, int64_t num_rows, int64_
   const at::Tensor grid = positions.slice(1, 1)
                               .reshape({1, grid_size, grid_size, positions.size(2)})
                               .permute({0, 3, 1, 2});
-  const at::Tensor resized = at::_upsample_bicubic2d_aa(
-      grid, {num_rows, num_columns}, /*align_corners=*/false, c10::nullopt, c10::nullopt);
+  const at::Tensor resized =
+      at::_upsample_bicubic2d_aa(grid, {num_rows, num_columns}, /*align_corners=*/false, {}, {});
   return at::cat({positions.slice(1, 0, 1), resized.flatten(2).transpose(1, 2)}, 1);
 }
 

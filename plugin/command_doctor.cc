@@ -2,6 +2,7 @@
 #include "bridge/colmap_database.h"
 #include "plugin/colmap.h"
 #include "plugin/commands.h"
+#include "plugin/network_program.h"
 #include "plugin/subprocess.h"
 #include "plugin/table.h"
 #include "plugin/version.h"
@@ -73,17 +74,6 @@ Finding CheckColmap(const fs::path& executable, json& result) {
   }
 }
 
-// The network's program lies beside this one, or in libexec of the same installation.
-fs::path FindNetworkProgram() {
-  std::error_code ignored;
-  const fs::path folder = fs::read_symlink("/proc/self/exe", ignored).parent_path();
-  for (const char* relative : {"vgtw-network", "../libexec/vgtw/vgtw-network"}) {
-    const fs::path path = FindExecutable((folder / relative).string());
-    if (!path.empty()) return path;
-  }
-  return FindExecutable("vgtw-network");
-}
-
 Finding CheckNetwork(json& result) {
   const fs::path program = FindNetworkProgram();
   if (program.empty()) {
@@ -93,6 +83,7 @@ Finding CheckNetwork(json& result) {
             "build with -DVGTW_WITH_NETWORK=ON after apt-get install libtorch-dev; everything that "
             "reads predictions works without it"};
   }
+  PrepareNetworkEnvironment();
   const SubprocessResult run = RunSubprocess(program, {"runtime"});
   const json runtime = json::parse(run.output, nullptr, /*allow_exceptions=*/false);
   if (run.exit_code != 0 || !runtime.is_object()) {
@@ -131,6 +122,7 @@ struct DoctorCommand {
     const bool has_colmap = result.contains("colmap");
     std::string text = Format(findings);
     text += "\nWorks here: import, mask make, mask apply, seed";
+    if (result.contains("libtorch")) text += ", predict, weights";
     text += has_colmap ? ", run, demo\n" : "\nNeeds colmap: run, demo\n";
     text += has_colmap ? "Next: vgtw demo --output_path demo/\n" : "Next: apt-get install colmap\n";
     Finish(usability, text, result);

@@ -33,8 +33,9 @@ std::function<void()> DeclareRun(Flags& flags) {
   PipelineOptions& options = command->options;
   flags.Group("Input")
       .Require("image_path", &options.image_path, "The photos")
-      .Require(
-          "predictions_path", &options.predictions_path, "Predictions folder (from 'vgtw import')")
+      .Require("predictions_path",
+               &options.predictions_path,
+               "Predictions folder (from 'vgtw predict' or 'vgtw import')")
       .Add("mask_path",
            &options.mask_path,
            "COLMAP masks made elsewhere, instead of the predicted distractors")

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/commands.h"
 
+#include "plugin/network_program.h"
 #include "plugin/progress.h"
 #include "scene/files.h"
 
@@ -21,6 +22,8 @@ const std::vector<Command>& Commands() {
        "  vgtw import --input_path vggt/sparse --image_path photos/ --output_path predictions/\n"
        "  vgtw import --input_path predictions.npz --image_path photos/ --output_path "
        "predictions/"},
+      {"predict", kPredictSummary, {}, {}, BecomeNetworkProgram},
+      {"mask", "Tools for distractor masks"},
       {"mask make",
        "Predictions -> COLMAP masks",
        DeclareMaskMake,
@@ -38,6 +41,10 @@ const std::vector<Command>& Commands() {
        "Photos and predictions -> masks, database, refined COLMAP model, report",
        DeclareRun,
        "  vgtw run --image_path photos/ --predictions_path predictions/ --output_path out/"},
+      {"weights", kWeightsSummary},
+      {"weights inspect", kWeightsInspectSummary, {}, {}, BecomeNetworkProgram},
+      {"weights check", kWeightsCheckSummary, {}, {}, BecomeNetworkProgram},
+      {"weights convert", kWeightsConvertSummary, {}, {}, BecomeNetworkProgram},
   };
   return commands;
 }

@@ -131,7 +131,7 @@ class Program {
       return ReportUsage(app_, CLI::RequiredError("A command"));
     }
     try {
-      work->second();
+      work->second(argc, argv);
       return 0;
     } catch (const Error& error) {
       return Fail(app_, error.what());
@@ -145,31 +145,45 @@ class Program {
   }
 
  private:
+  CLI::App& Group(const std::string& name, std::string_view summary) {
+    CLI::App*& group = groups_[name];
+    if (group == nullptr) {
+      group = app_.add_subcommand(name, std::string(summary));
+      group->require_subcommand(0, 1);
+    }
+    return *group;
+  }
+
   void Add(const Command& command) {
     CLI::App* parent = &app_;
     std::string name(command.name);
+    if (!command.declare && !command.forward) {
+      Group(name, command.summary);
+      return;
+    }
     if (const size_t space = name.find(' '); space != std::string::npos) {
-      const std::string group = name.substr(0, space);
-      CLI::App*& group_app = groups_[group];
-      if (group_app == nullptr) {
-        group_app = app_.add_subcommand(group, "Tools for distractor masks");
-        group_app->require_subcommand(0, 1);
-      }
-      parent = group_app;
+      parent = &Group(name.substr(0, space), "");
       name = name.substr(space + 1);
     }
     CLI::App* app = parent->add_subcommand(name, std::string(command.summary));
+    if (command.forward) {
+      // Everything behind the command's name, --help too, is the other program's.
+      app->set_help_flag();
+      app->prefix_command();
+      works_[app] = command.forward;
+      return;
+    }
     if (!command.examples.empty()) app->footer("Examples:\n" + std::string(command.examples));
     impls_.push_back(std::make_unique<Flags::Impl>());
     impls_.back()->app = app;
     Flags flags(impls_.back().get());
-    works_[app] = command.declare(flags);
+    works_[app] = [work = command.declare(flags)](int, char**) { work(); };
   }
 
   CLI::App app_;
   std::map<std::string, CLI::App*> groups_;
   std::vector<std::unique_ptr<Flags::Impl>> impls_;
-  std::map<const CLI::App*, std::function<void()>> works_;
+  std::map<const CLI::App*, ForwardCommand> works_;
 };
 
 }  // namespace

@@ -42,12 +42,17 @@ class Flags {
 // Declares its flags and returns the work to do once they are parsed.
 using DeclareCommand = std::function<std::function<void()>(Flags&)>;
 
-// One row of the table of commands. A name of two words ("mask make") is a sub-command.
+// Runs a command with the whole command line, of which nothing was parsed.
+using ForwardCommand = std::function<void(int argc, char** argv)>;
+
+// One row of the table of commands. A name of two words ("mask make") is a sub-command; a row
+// "mask" that neither declares nor forwards tells what they have in common, and comes first.
 struct Command {
   std::string_view name;
   std::string_view summary;
-  DeclareCommand declare;
+  DeclareCommand declare = {};
   std::string_view examples = {};  // shown under --help, one per line
+  ForwardCommand forward = {};     // in place of `declare`: another program has this command
 };
 
 // Parses the command line and runs the command: 0 done, 1 failed (one line on stderr), 2 wrong

@@ -2,9 +2,11 @@
 // The program `vgtw-network`: what needs LibTorch. `vgtw` executes it, because a program linked to
 // LibTorch takes 0.65 s to start.
 #include "network/runtime.h"
-#include "plugin/flags.h"
+#include "plugin/network_commands.h"
+#include "plugin/network_program.h"
 
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 
 #include <nlohmann/json.hpp>
@@ -47,12 +49,37 @@ std::function<void()> DeclareRuntime(Flags&) {
   };
 }
 
+std::vector<Command> NetworkCommands() {
+  return {
+      {"runtime", "The LibTorch at hand and its speed, as JSON", DeclareRuntime},
+      {"predict",
+       kPredictSummary,
+       DeclarePredict,
+       "  vgtw predict --image_path photos/ --weights_path vgtw.safetensors --output_path "
+       "predictions/\n"
+       "  vgtw predict --image_path photos/ --weights_path vggt.safetensors --lora_path lora.pt "
+       "--output_path predictions/"},
+      {"weights", kWeightsSummary},
+      {"weights inspect",
+       kWeightsInspectSummary,
+       DeclareWeightsInspect,
+       "  vgtw weights inspect --weights_path vgtw_lora_fp32.pt"},
+      {"weights check",
+       kWeightsCheckSummary,
+       DeclareWeightsCheck,
+       "  vgtw weights check --weights_path vggt.safetensors --lora_path lora.pt"},
+      {"weights convert",
+       kWeightsConvertSummary,
+       DeclareWeightsConvert,
+       "  vgtw weights convert --weights_path vgtw_lora_fp32.pt --output_path vgtw.safetensors"},
+  };
+}
+
 }  // namespace
 }  // namespace vgtw
 
 int main(int argc, char** argv) {
-  return vgtw::RunProgram(
-      {{"runtime", "The LibTorch at hand and its speed, as JSON", vgtw::DeclareRuntime}},
-      argc,
-      argv);
+  // A file-size limit is then an ordinary write error, which is reported and cleaned up after.
+  std::signal(SIGXFSZ, SIG_IGN);
+  return vgtw::RunProgram(vgtw::NetworkCommands(), argc, argv);
 }

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "network/predict.h"
+
+#include "network/predict_run.h"
+#include "network/vggt.h"
+#include "network/weights.h"
+#include "scene/error.h"
+#include "scene/parallel.h"
+
+#include <cmath>
+#include <utility>
+
+#include <ATen/ATen.h>
+#include <ATen/Parallel.h>
+#include <c10/util/Exception.h>
+
+namespace vgtw {
+namespace {
+
+at::Device ParseDevice(const std::string& text) {
+  const bool has_index = text.starts_with("cuda:") && text.size() > 5 && text.size() <= 8 &&
+                         text.find_first_not_of("0123456789", 5) == std::string::npos;
+  if (text == "cpu") return at::kCPU;
+  if (text != "cuda" && !has_index) {
+    throw Error("device '" + Printable(text) + "': expected cpu, cuda or cuda:<number>");
+  }
+  const int idx = has_index ? std::stoi(text.substr(5)) : 0;
+  const auto num_gpus = static_cast<int>(at::getNumGPUs());
+  if (num_gpus == 0) {
+    throw Error("device '" + text +
+                "': this LibTorch has no CUDA or finds no GPU (vgtw doctor tells); use cpu");
+  }
+  if (idx >= num_gpus) {
+    throw Error("device '" + text + "': there are " + std::to_string(num_gpus) +
+                " GPUs, counted from 0");
+  }
+  return {at::kCUDA, static_cast<at::DeviceIndex>(idx)};
+}
+
+at::ScalarType ProductType(Precision precision, const at::Device& device) {
+  if (precision == Precision::kFloat32) return at::kFloat;
+  if (precision == Precision::kBfloat16) return at::kBFloat16;
+  if (device.is_cpu()) throw Error("fp16 runs on a GPU only; use fp32 or bf16 on the CPU");
+  return at::kHalf;
+}
+
+at::Tensor DescribeViews(const VisionTransformer& encoder, const at::Tensor& images) {
+  const ChannelStatistics statistics = ImageNetStatistics(images.device());
+  return encoder((images - statistics.mean) / statistics.deviation).to(at::kFloat).mean(1);
+}
+
+// LibTorch's messages are a line, then a stack.
+template <typename Work>
+auto WithPlainErrors(const Work& work) {
+  try {
+    return work();
+  } catch (const c10::Error& error) {
+    const std::string text = error.what_without_backtrace();
+    const bool is_memory = text.find("memory") != std::string::npos;
+    throw Error("LibTorch: " + text.substr(0, text.find('\n')) +
+                (is_memory ? "; use a smaller --max_views or --max_memory" : ""));
+  }
+}
+
+}  // namespace
+
+void PredictOptions::Check() const {
+  VGTW_CHECK(side_px >= kPatchSize && side_px <= 1 << 14 && side_px % kPatchSize == 0,
+             "side_px = " + std::to_string(side_px) + ", must be a multiple of 14");
+  VGTW_CHECK(max_pixels >= kPatchSize * kPatchSize && max_pixels <= 1 << 28,
+             "max_pixels = " + std::to_string(max_pixels));
+  VGTW_CHECK(max_views_at_once >= 0 && max_views_at_once != 1,
+             "max_views = " + std::to_string(max_views_at_once));
+  VGTW_CHECK(num_overlap_views >= 1, "overlap = " + std::to_string(num_overlap_views));
+  VGTW_CHECK(std::isfinite(max_memory_gib) && max_memory_gib >= 0.0 && max_memory_gib < 1e6,
+             "max_memory = " + std::to_string(max_memory_gib));
+}
+
+struct Predictor::Impl {
+  PredictOptions options;
+  LoadedNetwork loaded;
+  ReadyNetwork network;
+};
+
+Predictor::Predictor(const std::vector<std::filesystem::path>& weights,
+                     const PredictOptions& options) {
+  options.Check();
+  LoadOptions load;
+  load.kind = options.kind;
+  load.device = ParseDevice(options.device);
+  load.product_type = ProductType(options.precision, load.device);
+  load.num_threads = options.num_threads;
+  // Loading converts types, which is LibTorch's work.
+  at::set_num_threads(ResolveThreads(options.num_threads));
+  impl_.reset(new Impl{options, WithPlainErrors([&] { return LoadNetwork(weights, load); }), {}});
+  const LoadedNetwork& loaded = impl_->loaded;
+  ReadyNetwork& network = impl_->network;
+  network.model = loaded.model.get();
+  network.description = loaded.description;
+  network.device = load.device;
+  if (load.device.is_cpu()) {
+    network.release_memory = [&loaded] { loaded.ReleasePages(); };
+  } else {
+    for (const auto& [name, tensor] : loaded.weights.tensors()) {
+      network.weights_bytes += static_cast<int64_t>(tensor.NumElements() * sizeof(float));
+    }
+  }
+  const auto* vggt = dynamic_cast<const Vggt*>(network.model);
+  if (vggt != nullptr && vggt->aggregator().encoder()) {
+    network.describe_views = [&encoder = *vggt->aggregator().encoder()](const at::Tensor& images) {
+      return DescribeViews(encoder, images);
+    };
+  }
+}
+
+Predictor::~Predictor() = default;
+
+NetworkKind Predictor::kind() const { return impl_->loaded.description.kind; }
+
+PredictSummary Predictor::Run(const std::filesystem::path& image_folder,
+                              const std::vector<std::string>& image_names,
+                              const std::function<void(const ViewPrediction&)>& on_prediction,
+                              const ProgressCallback& progress) const {
+  return WithPlainErrors([&] {
+    return PredictViews(
+        impl_->network, impl_->options, image_folder, image_names, on_prediction, progress);
+  });
+}
+
+}  // namespace vgtw

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Photos to predictions with a network that is loaded. Internal to network/: needs LibTorch.
+#pragma once
+
+#include "network/model.h"
+#include "network/predict.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <ATen/core/Tensor.h>
+
+namespace vgtw {
+
+struct ReadyNetwork {
+  const Model* model = nullptr;
+  NetworkDescription description;
+  at::Device device = at::kCPU;
+  int64_t weights_bytes = 0;  // in the device's memory; 0 if the file's pages serve
+  // [S, 3, H, W] in [0, 1] to one vector per view [S, E]; empty where no view is the reference.
+  std::function<at::Tensor(const at::Tensor& images)> describe_views = {};
+  // Called after every layer.
+  std::function<void()> release_memory = {};
+};
+
+// See Predictor::Run.
+PredictSummary PredictViews(const ReadyNetwork& network,
+                            const PredictOptions& options,
+                            const std::filesystem::path& image_folder,
+                            const std::vector<std::string>& image_names,
+                            const std::function<void(const ViewPrediction&)>& on_prediction,
+                            const ProgressCallback& progress);
+
+// The view whose vector [S, E] has the largest mean cosine to those of all views.
+int64_t MostConnectedView(const at::Tensor& descriptions);
+
+}  // namespace vgtw

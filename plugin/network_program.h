@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The program `vgtw-network`, which holds the commands that need LibTorch: a program linked to it
+// takes 0.65 s to start.
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+namespace vgtw {
+
+// Said by both programs.
+inline constexpr std::string_view kPredictSummary = "Photos and weights -> predictions folder";
+inline constexpr std::string_view kWeightsSummary =
+    "Look at, check and convert a network's weights";
+inline constexpr std::string_view kWeightsInspectSummary = "What a file of weights holds";
+inline constexpr std::string_view kWeightsCheckSummary = "Whether weights are complete and finite";
+inline constexpr std::string_view kWeightsConvertSummary =
+    "Weights of any format -> one .safetensors file";
+
+// It lies beside this program, or in libexec of the same installation, or on PATH; "" if nowhere.
+std::filesystem::path FindNetworkProgram();
+
+// Sets what LibTorch and its BLAS read from the environment when a process starts, unless the user
+// has set it: OPENBLAS_CORETYPE, where OpenBLAS may take the processor for an older one.
+void PrepareNetworkEnvironment();
+
+// Becomes the network's program with the same arguments, so that output, progress and exit code are
+// its own. Returns only by throwing Error: if it is not installed or cannot be executed.
+[[noreturn]] void BecomeNetworkProgram(int argc, char** argv);
+
+}  // namespace vgtw
