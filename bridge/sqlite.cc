@@ -208,15 +208,15 @@ void SqliteConnection::CopyBytes(const fs::path& target_path) const {
   if (code != SQLITE_OK) Throw(code);
   std::ofstream target(target_path, std::ios::binary | std::ios::trunc);
   std::vector<char> block(size_t{1} << 20);
-  for (sqlite3_int64 offset = 0; offset < size && target.good(); offset += std::ssize(block)) {
+  for (sqlite3_int64 offset = 0; offset < size; offset += std::ssize(block)) {
     block.resize(static_cast<size_t>(std::min<sqlite3_int64>(std::ssize(block), size - offset)));
     code = file->pMethods->xRead(file, block.data(), static_cast<int>(block.size()), offset);
     if (code != SQLITE_OK) Throw(code);
     if (offset == 0) block[kWriteVersionByte] = block[kReadVersionByte] = kRollbackMode;
-    target.write(block.data(), std::ssize(block));
+    if (!target.write(block.data(), std::ssize(block)).flush()) {
+      FailErrno(target_path, "cannot be written");
+    }
   }
-  target.close();
-  if (!target.good()) FailErrno(target_path, "cannot be written");
 }
 
 sqlite3_stmt* SqliteConnection::TakeStatement(std::string_view sql) {

@@ -185,7 +185,7 @@ TEST(FullDisk, ApplyLeavesEveryFileAsItWas) {
     const std::string copy_error = ErrorUnderFileLimit(max_bytes, [&] {
       ApplyMasks(folder / "a.db", folder / "masks", folder / "b.db", {.overwrite = true});
     });
-    EXPECT_THAT(copy_error, HasSubstr("cannot be read or written"));
+    EXPECT_THAT(copy_error, HasSubstr("cannot be written: File too large"));
     EXPECT_EQ(Snapshot(folder.path()), before);
     const std::string in_place_error = ErrorUnderFileLimit(
         max_bytes, [&] { ApplyMasks(folder / "a.db", folder / "masks", "", {.in_place = true}); });
