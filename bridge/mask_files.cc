@@ -6,14 +6,63 @@
 #include "scene/image_io.h"
 #include "scene/parallel.h"
 
-#include <functional>
-
 namespace vgtw {
 namespace {
 
-using MaskMaker = std::function<MaskSummary(size_t idx, StaticMask& static_mask)>;
+StaticMask AllWhite(uint64_t width, uint64_t height) {
+  return {static_cast<int>(width), static_cast<int>(height), 255};
+}
 
-// Writes `num_masks` masks in parallel; `make` fills one and says whose it is.
+}  // namespace
+
+std::filesystem::path MaskPath(const std::filesystem::path& mask_folder,
+                               const std::string& image_name) {
+  return mask_folder / (image_name + ".png");
+}
+
+void CheckSize(const std::filesystem::path& path,
+               const ImageSize& size,
+               const ImageSize& expected,
+               std::string_view whose,
+               std::string_view hint) {
+  if (size == expected) return;
+  const auto text = [](const ImageSize& value) {
+    return std::to_string(value.width) + " x " + std::to_string(value.height) + " pixels";
+  };
+  Fail(path, "has " + text(size), text(expected) + ", " + std::string(whose), hint);
+}
+
+StaticMask ReadMaskOfSize(const std::filesystem::path& path, const ImageSize& size) {
+  StaticMask static_mask = ReadStaticMask(path);
+  CheckSize(
+      path,
+      {static_cast<uint64_t>(static_mask.width()), static_cast<uint64_t>(static_mask.height())},
+      size,
+      "the size of its image",
+      "write masks at full size: COLMAP does not resize them");
+  return static_mask;
+}
+
+void CheckMasksExist(const std::filesystem::path& mask_folder,
+                     const std::vector<std::string>& image_names,
+                     bool allow_missing) {
+  if (!std::filesystem::is_directory(mask_folder)) {
+    Fail(mask_folder, "is not a folder", "masks named <image name>.png");
+  }
+  std::filesystem::path first_missing;
+  size_t num_missing = 0;
+  for (const std::string& name : image_names) {
+    const std::filesystem::path path = MaskPath(mask_folder, name);
+    if (!std::filesystem::exists(path) && num_missing++ == 0) first_missing = path;
+  }
+  if (num_missing == 0 || allow_missing) return;
+  Fail(first_missing,
+       "is missing (" + std::to_string(num_missing) + " of " + std::to_string(image_names.size()) +
+           " images have no mask)",
+       "one mask per image",
+       "write all-white ones, or allow missing masks");
+}
+
 std::vector<MaskSummary> WriteMaskFolder(const std::filesystem::path& mask_folder,
                                          bool overwrite,
                                          size_t num_masks,
@@ -32,33 +81,6 @@ std::vector<MaskSummary> WriteMaskFolder(const std::filesystem::path& mask_folde
   ParallelFor(static_cast<int64_t>(num_masks), num_threads, write_mask, progress);
   folder.Commit();
   return summaries;
-}
-
-StaticMask AllWhite(uint64_t width, uint64_t height) {
-  return {static_cast<int>(width), static_cast<int>(height), 255};
-}
-
-}  // namespace
-
-std::filesystem::path MaskPath(const std::filesystem::path& mask_folder,
-                               const std::string& image_name) {
-  return mask_folder / (image_name + ".png");
-}
-
-StaticMask ReadMaskOfSize(const std::filesystem::path& path, const ImageSize& size) {
-  StaticMask static_mask = ReadStaticMask(path);
-  const auto text = [](uint64_t width, uint64_t height) {
-    return std::to_string(width) + " x " + std::to_string(height) + " pixels";
-  };
-  const auto width = static_cast<uint64_t>(static_mask.width());
-  const auto height = static_cast<uint64_t>(static_mask.height());
-  if (ImageSize{width, height} != size) {
-    Fail(path,
-         "has " + text(width, height),
-         text(size.width, size.height) + ", the size of its image",
-         "write masks at full size: COLMAP does not resize them");
-  }
-  return static_mask;
 }
 
 std::vector<MaskSummary> WriteMasks(const PredictionReader& predictions,
@@ -87,9 +109,7 @@ std::vector<MaskSummary> CopyMasks(const std::filesystem::path& from_folder,
                                    bool overwrite,
                                    int num_threads,
                                    const ProgressCallback& progress) {
-  if (!std::filesystem::is_directory(from_folder)) {
-    Fail(from_folder, "is not a folder", "masks named <image name>.png");
-  }
+  CheckMasksExist(from_folder, image_names, /*allow_missing=*/true);
   const auto make = [&](size_t idx, StaticMask& static_mask) {
     const std::string& name = image_names[idx];
     VGTW_CHECK(IsSafeRelativeName(name), "image name '" + Printable(name) + "'");

@@ -6,8 +6,11 @@
 #include "scene/image_io.h"
 #include "scene/progress.h"
 
+#include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace vgtw {
@@ -20,11 +23,37 @@ std::filesystem::path MaskPath(const std::filesystem::path& mask_folder,
 // not resize masks, a smaller one silently excludes what lies beyond it.
 StaticMask ReadMaskOfSize(const std::filesystem::path& path, const ImageSize& size);
 
+// Throws Error "<path>: has W x H pixels, expected W x H pixels, <whose>; <hint>" unless the sizes
+// are the same.
+void CheckSize(const std::filesystem::path& path,
+               const ImageSize& size,
+               const ImageSize& expected,
+               std::string_view whose,
+               std::string_view hint);
+
+// Throws Error if the folder is missing or, with the first name and their number, if images have no
+// mask in it though that is not allowed.
+void CheckMasksExist(const std::filesystem::path& mask_folder,
+                     const std::vector<std::string>& image_names,
+                     bool allow_missing);
+
 struct MaskSummary {
   std::string image_name;
   double excluded_share = 0.0;  // of the image's pixels, in [0,1]
   bool was_missing = false;     // there was nothing to make it from; it is all-white
 };
+
+// Fills the idx-th mask and says whose it is; excluded_share is set by WriteMaskFolder.
+using MaskMaker = std::function<MaskSummary(size_t idx, StaticMask& static_mask)>;
+
+// Writes `num_masks` masks named by MaskPath; `make` is called by `num_threads` threads at once.
+// The folder appears complete or not at all, as by AtomicFolder.
+std::vector<MaskSummary> WriteMaskFolder(const std::filesystem::path& mask_folder,
+                                         bool overwrite,
+                                         size_t num_masks,
+                                         int num_threads,
+                                         const ProgressCallback& progress,
+                                         const MaskMaker& make);
 
 // Writes one mask per view, also an all-white one where nothing is excluded or nothing was
 // predicted (COLMAP >= 3.12 drops images without one). Masks have the original image's size. The
