@@ -24,6 +24,12 @@ const std::vector<Command>& Commands() {
        "Predictions -> COLMAP masks",
        DeclareMaskMake,
        "  vgtw mask make --predictions_path predictions/ --output_path masks/ --dilate_px 10"},
+      {"mask convert",
+       "Masks of one tool -> masks of another",
+       DeclareMaskConvert,
+       "  vgtw mask convert --list\n"
+       "  vgtw mask convert --image_path photos/ --mask_path masks/ --from colmap --to openmvs "
+       "--output_path openmvs_masks/"},
       {"mask apply",
        "Take distractors out of an existing COLMAP database",
        DeclareMaskApply,

@@ -17,6 +17,7 @@ std::function<void()> DeclareDemo(Flags& flags);
 std::function<void()> DeclareDoctor(Flags& flags);
 std::function<void()> DeclareImport(Flags& flags);
 std::function<void()> DeclareMaskApply(Flags& flags);
+std::function<void()> DeclareMaskConvert(Flags& flags);
 std::function<void()> DeclareMaskMake(Flags& flags);
 std::function<void()> DeclareRun(Flags& flags);
 std::function<void()> DeclareSeed(Flags& flags);
