@@ -184,9 +184,7 @@ void CheckWritable(const Reconstruction& reconstruction) {
 }  // namespace
 
 Reconstruction ReadModel(const fs::path& folder) {
-  if (!IsModelFolder(folder)) FailWithoutModel(folder);
-  const ModelFormat format =
-      HasModelFiles(folder, ModelFormat::kBinary) ? ModelFormat::kBinary : ModelFormat::kText;
+  const ModelFormat format = ModelFormatOf(folder);
   Reconstruction reconstruction;
   for (const FileKind& kind : kModelFiles) ParseFile(folder, kind, format, reconstruction);
   if (HasRigFiles(folder, format)) {
@@ -204,6 +202,11 @@ Reconstruction ReadModel(const fs::path& folder) {
 
 bool IsModelFolder(const fs::path& folder) {
   return HasModelFiles(folder, ModelFormat::kBinary) || HasModelFiles(folder, ModelFormat::kText);
+}
+
+ModelFormat ModelFormatOf(const fs::path& folder) {
+  if (!IsModelFolder(folder)) FailWithoutModel(folder);
+  return HasModelFiles(folder, ModelFormat::kBinary) ? ModelFormat::kBinary : ModelFormat::kText;
 }
 
 void WriteModel(const Reconstruction& reconstruction,

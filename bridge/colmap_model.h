@@ -21,6 +21,9 @@ bool IsModelFolder(const std::filesystem::path& folder);
 
 enum class ModelFormat { kBinary, kText };
 
+// The format that ReadModel reads there. Throws Error if the folder holds no model.
+ModelFormat ModelFormatOf(const std::filesystem::path& folder);
+
 struct WriteModelOptions {
   ModelFormat format = ModelFormat::kBinary;
   bool overwrite = false;  // replace the folder as a whole; else it must be new or empty

@@ -1,331 +1,99 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/mask_apply.h"
 
-#include "bridge/colmap_rows.h"
+#include "bridge/colmap_model.h"
 #include "bridge/colmap_schema.h"
-#include "bridge/mask_files.h"
+#include "bridge/database_edit.h"
+#include "bridge/mask_apply_images.h"
+#include "bridge/mask_apply_rules.h"
+#include "bridge/mask_model.h"
+#include "bridge/mask_undo.h"
 #include "bridge/sqlite.h"
 #include "scene/error.h"
-#include "scene/files.h"
-#include "scene/image_io.h"
-#include "scene/parallel.h"
 
-#include <algorithm>
-#include <cstring>
-#include <limits>
-#include <unordered_map>
-
-#include <Eigen/Core>
+#include <cmath>
 
 namespace vgtw {
 namespace {
 
 namespace fs = std::filesystem;
 
-// One image of the database with what its mask says.
-struct MaskedImage {
-  ImageId image_id = 0;
-  uint64_t width = 0;
-  uint64_t height = 0;
-  std::vector<bool> is_excluded;  // per keypoint
-  ApplyMasksImageSummary summary;
-};
-
-using MaskedImages = std::unordered_map<ImageId, const MaskedImage*>;
-using KeypointPositions = std::vector<Eigen::Vector2f>;
-
-// Counts the units of work of all stages together.
-class ProgressCounter {
- public:
-  ProgressCounter(ProgressCallback callback, int64_t total)
-      : callback_(std::move(callback)), total_(total) {}
-  void Advance(int64_t units) {
-    done_ += units;
-    if (callback_) callback_(done_, total_);
-  }
-
- private:
-  ProgressCallback callback_;
-  int64_t total_ = 0;
-  int64_t done_ = 0;
-};
-
-int64_t CountUnits(SqliteConnection& connection) {
-  SqliteQuery query(connection,
-                    "SELECT (SELECT count(*) FROM images) + (SELECT count(*) FROM matches) + "
-                    "(SELECT count(*) FROM two_view_geometries)");
+int64_t Count(SqliteConnection& connection, const char* table) {
+  SqliteQuery query(connection, std::string("SELECT count(*) FROM ") + table);
   return query.Next() ? query.Int(0) : 0;
 }
 
-// Only sizes of cameras are read, so that models of COLMAP that Camera does not know do no harm.
-std::vector<MaskedImage> ReadImages(SqliteConnection& connection) {
-  std::vector<MaskedImage> images;
-  SqliteQuery query(connection,
-                    "SELECT images.image_id, images.name, cameras.width, cameras.height "
-                    "FROM images LEFT JOIN cameras ON cameras.camera_id = images.camera_id "
-                    "ORDER BY CAST(images.name AS BLOB)");
-  while (query.Next()) {
-    MaskedImage image;
-    image.image_id = CheckedId(query, 0, "image");
-    image.summary.image_name = query.Text(1);
-    if (!IsSafeRelativeName(image.summary.image_name)) {
-      Fail(query.path(),
-           "names an image '" + Printable(image.summary.image_name) + "'",
-           "a relative path with '/' inside the image folder");
-    }
-    if (query.IsNull(2)) {
-      Fail(
-          query.path(), "has an image without a camera: " + image.summary.image_name, "one camera");
-    }
-    image.width = static_cast<uint64_t>(query.Int(2));
-    image.height = static_cast<uint64_t>(query.Int(3));
-    images.push_back(std::move(image));
-  }
-  return images;
+int64_t CountUnits(SqliteConnection& connection, MaskRule rule) {
+  const int64_t num_images = Count(connection, "images");
+  const int64_t num_geometries = Count(connection, "two_view_geometries");
+  return num_images + Count(connection, "matches") + num_geometries +
+         (rule == MaskRule::kKeypoints ? num_images : 0) +
+         (rule == MaskRule::kTracks ? num_geometries : 0);
 }
 
-void FindMasks(const fs::path& mask_folder, bool allow_missing, std::vector<MaskedImage>& images) {
-  if (!fs::is_directory(mask_folder)) {
-    Fail(mask_folder, "is not a folder", "masks named <image name>.png");
-  }
-  fs::path first_missing;
-  size_t num_missing = 0;
-  for (MaskedImage& image : images) {
-    const fs::path path = MaskPath(mask_folder, image.summary.image_name);
-    image.summary.has_mask = fs::exists(path);
-    if (image.summary.has_mask) continue;
-    if (num_missing++ == 0) first_missing = path;
-  }
-  if (num_missing == 0 || allow_missing) return;
-  Fail(first_missing,
-       "is missing (" + std::to_string(num_missing) + " of " + std::to_string(images.size()) +
-           " images have no mask)",
-       "one mask per image",
-       "write all-white ones, or allow missing masks");
-}
-
-KeypointPositions ReadPositions(SqliteConnection& connection, ImageId image_id) {
-  SqliteQuery query(
-      connection, "SELECT rows, cols, data FROM keypoints WHERE image_id = ?", image_id);
-  if (!query.Next()) return {};
-  const MatrixBlob blob = ReadKeypointsBlob(query, 0, image_id);
-  KeypointPositions positions(blob.rows);
-  const size_t row_bytes = blob.cols * sizeof(float);
-  for (size_t row = 0; row < positions.size(); ++row) {
-    std::memcpy(positions[row].data(), blob.bytes.data() + row * row_bytes, 2 * sizeof(float));
-  }
-  return positions;
-}
-
-void TestKeypoints(const fs::path& mask_folder,
-                   const KeypointPositions& positions,
-                   MaskedImage& image) {
-  image.summary.num_keypoints = positions.size();
-  image.is_excluded.assign(positions.size(), false);
-  if (!image.summary.has_mask) return;
-  const StaticMask static_mask =
-      ReadMaskOfSize(MaskPath(mask_folder, image.summary.image_name), {image.width, image.height});
-  for (size_t i = 0; i < positions.size(); ++i) {
-    image.is_excluded[i] = IsExcluded(static_mask, positions[i].x(), positions[i].y());
-  }
-  image.summary.num_excluded_keypoints =
-      static_cast<uint64_t>(std::count(image.is_excluded.begin(), image.is_excluded.end(), true));
-}
-
-// Images sorted by name. Masks are decoded in parallel, a batch at a time to bound the memory.
-std::vector<MaskedImage> MaskImages(SqliteConnection& connection,
-                                    const fs::path& mask_folder,
-                                    const ApplyMasksOptions& options,
-                                    ProgressCounter& progress) {
-  constexpr size_t kBatchSize = 64;
-  std::vector<MaskedImage> images = ReadImages(connection);
-  if (!mask_folder.empty()) FindMasks(mask_folder, options.allow_missing_masks, images);
-  for (size_t begin = 0; begin < images.size(); begin += kBatchSize) {
-    const size_t size = std::min(kBatchSize, images.size() - begin);
-    std::vector<KeypointPositions> positions;
-    for (size_t i = 0; i < size; ++i) {
-      positions.push_back(ReadPositions(connection, images[begin + i].image_id));
-    }
-    ParallelFor(static_cast<int64_t>(size), options.num_threads, [&](int64_t i) {
-      const auto idx = static_cast<size_t>(i);
-      TestKeypoints(mask_folder, positions[idx], images[begin + idx]);
-    });
-    progress.Advance(static_cast<int64_t>(size));
-  }
-  return images;
-}
-
-// A table of matched keypoints. An emptied geometry becomes what COLMAP stores for a pair without
-// one (configuration 0), else the geometry stays.
-struct PairTable {
-  const char* name;
-  const char* select_next;
-  const char* update;
-};
-constexpr PairTable kMatches = {
-    "matches",
-    "SELECT pair_id, rows, cols, data FROM matches WHERE pair_id > ? ORDER BY pair_id LIMIT 1",
-    "UPDATE matches SET rows = ?1, data = ?2 WHERE pair_id = ?3"};
-constexpr PairTable kTwoViewGeometries = {
-    "two-view geometry",
-    "SELECT pair_id, rows, cols, data FROM two_view_geometries WHERE pair_id > ? "
-    "ORDER BY pair_id LIMIT 1",
-    "UPDATE two_view_geometries SET rows = ?1, data = ?2, "
-    "config = CASE ?1 WHEN 0 THEN 0 ELSE config END WHERE pair_id = ?3"};
-
-struct Pair {
-  int64_t pair_id = 0;
-  std::string name;
-  const MaskedImage* image1 = nullptr;
-  const MaskedImage* image2 = nullptr;
-  FeatureMatches matches;
-};
-
-std::optional<Pair> ReadNextPair(SqliteConnection& connection,
-                                 const PairTable& table,
-                                 int64_t previous_pair_id,
-                                 const MaskedImages& images) {
-  SqliteQuery query(connection, table.select_next, previous_pair_id);
-  if (!query.Next()) return std::nullopt;
-  Pair pair;
-  pair.pair_id = query.Int(0);
-  const auto [image_id1, image_id2] = CheckedImageIds(query, pair.pair_id);
-  pair.name = std::string(table.name) + " of images " + std::to_string(image_id1) + " and " +
-              std::to_string(image_id2);
-  const auto find = [&](ImageId image_id) {
-    const auto found = images.find(image_id);
-    if (found == images.end()) {
-      Fail(query.path(), pair.name + ": no image " + std::to_string(image_id), "both images");
-    }
-    return found->second;
-  };
-  pair.image1 = find(image_id1);
-  pair.image2 = find(image_id2);
-  pair.matches = ReadMatchesBlob(query, 1, pair.name);
-  return pair;
-}
-
-void RemoveExcluded(const fs::path& path, Pair& pair) {
-  const auto is_excluded = [&](const MaskedImage& image, uint32_t point2D_idx) {
-    if (point2D_idx >= image.is_excluded.size()) {
-      Fail(path,
-           pair.name + ": keypoint " + std::to_string(point2D_idx) + " of '" +
-               image.summary.image_name + "'",
-           "less than its " + std::to_string(image.is_excluded.size()) + " keypoints");
-    }
-    return image.is_excluded[point2D_idx];
-  };
-  std::erase_if(pair.matches, [&](const std::array<uint32_t, 2>& match) {
-    const bool is_excluded1 = is_excluded(*pair.image1, match[0]);
-    return is_excluded(*pair.image2, match[1]) || is_excluded1;
-  });
-}
-
-struct Counts {
-  uint64_t before = 0;
-  uint64_t after = 0;
-};
-
-Counts FilterTable(SqliteConnection& connection,
-                   const PairTable& table,
-                   const MaskedImages& images,
-                   ProgressCounter& progress) {
-  Counts counts;
-  int64_t pair_id = std::numeric_limits<int64_t>::min();
-  while (auto pair = ReadNextPair(connection, table, pair_id, images)) {
-    pair_id = pair->pair_id;
-    const size_t num_before = pair->matches.size();
-    RemoveExcluded(connection.path(), *pair);
-    const size_t num_after = pair->matches.size();
-    if (num_after < num_before) {
-      connection.Execute(table.update, num_after, AsBlob(pair->matches), pair_id);
-    }
-    counts.before += num_before;
-    counts.after += num_after;
-    progress.Advance(1);
-  }
-  return counts;
-}
-
-ApplyMasksSummary FilterPairs(SqliteConnection& connection,
-                              const std::vector<MaskedImage>& masked_images,
-                              ProgressCounter& progress) {
-  MaskedImages images;
-  ApplyMasksSummary summary;
-  for (const MaskedImage& image : masked_images) {
-    images[image.image_id] = &image;
-    summary.images.push_back(image.summary);
-  }
-  const Counts matches = FilterTable(connection, kMatches, images, progress);
-  const Counts inliers = FilterTable(connection, kTwoViewGeometries, images, progress);
-  summary.num_matches_before = matches.before;
-  summary.num_matches_after = matches.after;
-  summary.num_inlier_matches_before = inliers.before;
-  summary.num_inlier_matches_after = inliers.after;
-  return summary;
-}
-
-// The database is locked from the first look at its keypoints on.
-ApplyMasksSummary ApplyInPlace(const fs::path& database_path,
-                               const fs::path& mask_folder,
-                               const ApplyMasksOptions& options,
-                               const ProgressCallback& callback) {
-  SqliteConnection connection(database_path, SqliteConnection::Mode::kReadWrite);
-  RecogniseSchema(connection);
-  SqliteTransaction transaction(connection);
-  ProgressCounter progress(callback, CountUnits(connection));
-  const auto images = MaskImages(connection, mask_folder, options, progress);
-  const ApplyMasksSummary summary = FilterPairs(connection, images, progress);
-  transaction.Commit();
-  return summary;
-}
-
-ApplyMasksSummary ApplyToCopy(const fs::path& database_path,
-                              const fs::path& mask_folder,
-                              const fs::path& output_path,
-                              const ApplyMasksOptions& options,
-                              const ProgressCallback& callback) {
-  SqliteConnection source(database_path, SqliteConnection::Mode::kReadOnly);
-  RecogniseSchema(source);
-  const SqliteTransaction snapshot(source);
-  ProgressCounter progress(callback, CountUnits(source));
-  const auto images = MaskImages(source, mask_folder, options, progress);
-
-  AtomicDatabase file(output_path, options.overwrite);
-  source.CopyTo(file.path());
-  ApplyMasksSummary summary;
-  {
-    SqliteConnection copy(file.path(), SqliteConnection::Mode::kPrivate);
-    SqliteTransaction transaction(copy);
-    summary = FilterPairs(copy, images, progress);
-    transaction.Commit();
-  }
-  file.Commit();
-  return summary;
-}
-
-bool IsSameFile(const fs::path& a, const fs::path& b) {
+// Refuses before any work what would be refused after it.
+void CheckModelPaths(const ApplyMasksOptions& options) {
+  if (options.model_path.empty()) return;
   std::error_code code;
-  return fs::equivalent(a, b, code) && !code;
+  if (fs::equivalent(options.model_path, options.model_output_path, code) && !code) {
+    Fail(options.model_output_path,
+         "is the model to be read",
+         "another folder: a model cannot be restored");
+  }
 }
 
 }  // namespace
+
+void ApplyMasksOptions::Check() const {
+  VGTW_CHECK(dilate_px >= 0, "dilate_px = " + std::to_string(dilate_px) + ", must be >= 0");
+  VGTW_CHECK(dilate_scale >= 0.0 && std::isfinite(dilate_scale),
+             "dilate_scale = " + std::to_string(dilate_scale) + ", must be >= 0");
+  VGTW_CHECK(min_num_inliers >= 0,
+             "min_num_inliers = " + std::to_string(min_num_inliers) + ", must be >= 0");
+  VGTW_CHECK(model_path.empty() == model_output_path.empty(),
+             "a model needs both a folder to read and one to write");
+}
 
 ApplyMasksSummary ApplyMasks(const fs::path& database_path,
                              const fs::path& mask_folder,
                              const fs::path& output_path,
                              const ApplyMasksOptions& options,
-                             const ProgressCallback& progress) {
+                             const ProgressCallback& callback) {
   VGTW_CHECK(!mask_folder.empty(), "masks need a folder");
-  const bool is_same = IsSameFile(database_path, output_path);
-  if (options.in_place) {
-    VGTW_CHECK(output_path.empty() || is_same, "in_place writes to database_path alone");
-    return ApplyInPlace(database_path, mask_folder, options, progress);
+  options.Check();
+  CheckModelPaths(options);
+  DatabaseEdit edit(database_path, output_path, options.in_place, options.overwrite);
+  ProgressCounter progress(callback, CountUnits(edit.source(), options.rule));
+  std::vector<MaskedImage> images = MaskImages(edit.source(), mask_folder, options, progress);
+
+  ApplyMasksSummary summary;
+  for (const MaskedImage& image : images) summary.images.push_back(image.summary);
+  Reconstruction model;
+  if (!options.model_path.empty()) {
+    model = ReadModel(options.model_path);
+    summary.model = MaskModel(options.model_path, images, options.rule, model);
   }
-  if (is_same) {
-    Fail(output_path, "is the database to be read", "another file", "or ask for in-place changes");
+  if (options.rule == MaskRule::kTracks) {
+    summary.num_linked_keypoints = ExcludeTracks(edit.source(), images, progress);
   }
-  return ApplyToCopy(database_path, mask_folder, output_path, options, progress);
+
+  MaskUndo undo(edit.target(), options.keep_undo);
+  const bool removes_keypoints = options.rule == MaskRule::kKeypoints;
+  if (removes_keypoints) RemoveKeypoints(edit.target(), images, undo, progress);
+  FilterPairs(edit.target(),
+              images,
+              {.renumber = removes_keypoints,
+               .min_num_inliers = static_cast<uint64_t>(options.min_num_inliers)},
+              undo,
+              progress,
+              summary);
+  if (!options.model_path.empty()) {
+    WriteModel(model,
+               options.model_output_path,
+               {.format = ModelFormatOf(options.model_path), .overwrite = options.overwrite});
+  }
+  edit.Commit();
+  return summary;
 }
 
 std::vector<ApplyMasksImageSummary> CountExcludedKeypoints(const fs::path& database_path,

@@ -198,6 +198,19 @@ bool IsExcluded(const StaticMask& static_mask, double x, double y) {
   return !is_inside || static_mask(static_cast<int>(x), static_cast<int>(y)) == 0;
 }
 
+Grid<float> DistanceToExcluded(const StaticMask& static_mask) {
+  Grid<float> distance(
+      static_mask.width(), static_mask.height(), std::numeric_limits<float>::infinity());
+  const auto& pixels = static_mask.data();
+  if (std::find(pixels.begin(), pixels.end(), 0) == pixels.end()) return distance;
+  // OpenCV's headers of foreign memory are not const; the source is only read.
+  const cv::Mat is_kept(
+      static_mask.height(), static_mask.width(), CV_8UC1, const_cast<uint8_t*>(pixels.data()));
+  DistanceToZero(is_kept).copyTo(
+      cv::Mat(distance.height(), distance.width(), CV_32FC1, distance.data().data()));
+  return distance;
+}
+
 double ExcludedShare(const StaticMask& static_mask) {
   if (static_mask.empty()) return 0.0;
   const auto num_excluded = std::count(static_mask.data().begin(), static_mask.data().end(), 0);

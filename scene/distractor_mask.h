@@ -49,6 +49,10 @@ StaticMask MakeStaticMask(const View& view,
 // COLMAP's test of a keypoint: value at (floor(x), floor(y)); outside the mask is excluded.
 bool IsExcluded(const StaticMask& static_mask, double x, double y);
 
+// Distance in pixels from the centre of each pixel to that of the nearest excluded one: 0 where
+// excluded, infinite if nothing is. `<= radius` is MakeStaticMask's dilation by a disc.
+Grid<float> DistanceToExcluded(const StaticMask& static_mask);
+
 // Share of excluded pixels, in [0,1].
 double ExcludedShare(const StaticMask& static_mask);
 

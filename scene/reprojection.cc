@@ -79,16 +79,18 @@ ReprojectionStats ComputeReprojectionStats(const Reconstruction& reconstruction)
   return stats;
 }
 
+void UpdatePointError(const Reconstruction& reconstruction, Point3D& point) {
+  double sum = 0.0;
+  size_t num_errors = 0;
+  ForEachError(reconstruction, point, [&](const std::optional<double>& error) {
+    sum += error.value_or(0.0);
+    num_errors += error.has_value();
+  });
+  point.error = num_errors > 0 ? sum / static_cast<double>(num_errors) : -1.0;
+}
+
 void UpdatePointErrors(Reconstruction& reconstruction) {
-  for (auto& [point3D_id, point] : reconstruction.points3D) {
-    double sum = 0.0;
-    size_t num_errors = 0;
-    ForEachError(reconstruction, point, [&](const std::optional<double>& error) {
-      sum += error.value_or(0.0);
-      num_errors += error.has_value();
-    });
-    point.error = num_errors > 0 ? sum / static_cast<double>(num_errors) : -1.0;
-  }
+  for (auto& [point3D_id, point] : reconstruction.points3D) UpdatePointError(reconstruction, point);
 }
 
 }  // namespace vgtw

@@ -27,7 +27,9 @@ struct ReprojectionStats {
 };
 ReprojectionStats ComputeReprojectionStats(const Reconstruction& reconstruction);
 
-// Sets Point3D::error to the mean error of its observations in front of their cameras.
+// Sets Point3D::error to the mean error of its observations in front of their cameras, -1 if there
+// are none.
+void UpdatePointError(const Reconstruction& reconstruction, Point3D& point);
 void UpdatePointErrors(Reconstruction& reconstruction);
 
 }  // namespace vgtw

@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bridge/mask_apply_rules.h"
+
+#include "bridge/colmap_rows.h"
+#include "bridge/mask_undo.h"
+#include "bridge/sqlite.h"
+#include "scene/error.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <string>
+
+namespace vgtw {
+namespace {
+
+using ImageIndexById = std::unordered_map<ImageId, size_t>;
+
+// One row of matches or two-view geometries.
+struct Pair {
+  int64_t pair_id = 0;
+  size_t image_idx1 = 0;
+  size_t image_idx2 = 0;
+  FeatureMatches matches;  // every index is one of a keypoint
+};
+
+// Reads the pairs of a table one at a time, so that they may be changed meanwhile.
+class PairReader {
+ public:
+  PairReader(SqliteConnection& connection,
+             const MaskedTable& table,
+             const std::vector<MaskedImage>& images)
+      : connection_(connection),
+        table_(table),
+        images_(images),
+        sql_(MaskedTableSql("SELECT pair_id, rows, cols, data FROM {table} WHERE pair_id > ? "
+                            "ORDER BY pair_id LIMIT 1",
+                            table)) {
+    for (size_t i = 0; i < images.size(); ++i) image_idx_by_id_[images[i].image_id] = i;
+  }
+
+  std::optional<Pair> Next() {
+    SqliteQuery query(connection_, sql_, previous_pair_id_);
+    if (!query.Next()) return std::nullopt;
+    Pair pair;
+    pair.pair_id = previous_pair_id_ = query.Int(0);
+    const auto [image_id1, image_id2] = CheckedImageIds(query, pair.pair_id);
+    const std::string name = std::string(table_.row_label) + " of images " +
+                             std::to_string(image_id1) + " and " + std::to_string(image_id2);
+    pair.image_idx1 = FindImage(image_id1, name);
+    pair.image_idx2 = FindImage(image_id2, name);
+    pair.matches = ReadMatchesBlob(query, 1, name);
+    for (const auto& [point2D_idx1, point2D_idx2] : pair.matches) {
+      CheckIndex(pair.image_idx1, point2D_idx1, name);
+      CheckIndex(pair.image_idx2, point2D_idx2, name);
+    }
+    return pair;
+  }
+
+ private:
+  size_t FindImage(ImageId image_id, const std::string& name) const {
+    const auto found = image_idx_by_id_.find(image_id);
+    if (found == image_idx_by_id_.end()) {
+      Fail(connection_.path(), name + ": no image " + std::to_string(image_id), "both images");
+    }
+    return found->second;
+  }
+
+  void CheckIndex(size_t image_idx, uint32_t point2D_idx, const std::string& name) const {
+    const MaskedImage& image = images_[image_idx];
+    if (point2D_idx < image.is_excluded.size()) return;
+    Fail(connection_.path(),
+         name + ": keypoint " + std::to_string(point2D_idx) + " of '" + image.summary.image_name +
+             "'",
+         "less than its " + std::to_string(image.is_excluded.size()) + " keypoints");
+  }
+
+  SqliteConnection& connection_;
+  const MaskedTable& table_;
+  const std::vector<MaskedImage>& images_;
+  std::string sql_;
+  ImageIndexById image_idx_by_id_;
+  int64_t previous_pair_id_ = std::numeric_limits<int64_t>::min();
+};
+
+// The connected components of all keypoints under links between two of them.
+class Tracks {
+ public:
+  explicit Tracks(const std::vector<MaskedImage>& images, const std::filesystem::path& path) {
+    uint64_t num_keypoints = 0;
+    for (const MaskedImage& image : images) {
+      first_.push_back(static_cast<uint32_t>(num_keypoints));
+      num_keypoints += image.is_excluded.size();
+      if (num_keypoints > std::numeric_limits<uint32_t>::max()) {
+        Fail(path, "has more than 4294967295 keypoints", "less", "use another --rule");
+      }
+    }
+    parents_.resize(num_keypoints);
+    std::iota(parents_.begin(), parents_.end(), 0);
+  }
+
+  void Link(size_t image_idx1, uint32_t idx1, size_t image_idx2, uint32_t idx2) {
+    const uint32_t root1 = Root(image_idx1, idx1);
+    const uint32_t root2 = Root(image_idx2, idx2);
+    parents_[std::max(root1, root2)] = std::min(root1, root2);
+  }
+
+  // One keypoint that stands for all of a track.
+  uint32_t Root(size_t image_idx, uint32_t idx) {
+    uint32_t keypoint = first_[image_idx] + idx;
+    while (parents_[keypoint] != keypoint) {
+      keypoint = parents_[keypoint] = parents_[parents_[keypoint]];
+    }
+    return keypoint;
+  }
+
+  size_t num_keypoints() const { return parents_.size(); }
+
+ private:
+  std::vector<uint32_t> first_;  // per image, its first keypoint among all
+  std::vector<uint32_t> parents_;
+};
+
+template <typename Visit>
+void ForEachKeypoint(const std::vector<MaskedImage>& images, const Visit& visit) {
+  for (size_t i = 0; i < images.size(); ++i) {
+    for (size_t idx = 0; idx < images[i].is_excluded.size(); ++idx) {
+      visit(i, static_cast<uint32_t>(idx));
+    }
+  }
+}
+
+// Rewrites the row of an image in `table` without its excluded keypoints.
+void RemoveRows(SqliteConnection& connection,
+                const MaskedTable& table,
+                const MaskedImage& image,
+                MaskUndo& undo) {
+  std::vector<std::byte> kept;
+  size_t num_kept = 0;
+  {
+    SqliteQuery query(
+        connection,
+        MaskedTableSql("SELECT rows, cols, data FROM {table} WHERE {row_id} = ?", table),
+        image.image_id);
+    if (!query.Next()) return;
+    const std::string owner =
+        std::string(table.row_label) + " of image " + std::to_string(image.image_id);
+    const MatrixBlob blob = ReadMatrixBlob(query, 0, table.bytes_per_value, owner);
+    if (blob.rows == 0) return;  // features without descriptors
+    if (blob.rows != image.is_excluded.size()) {
+      Fail(connection.path(),
+           owner + " has " + std::to_string(blob.rows) + " rows",
+           "one per keypoint, " + std::to_string(image.is_excluded.size()));
+    }
+    const size_t row_bytes = blob.cols * table.bytes_per_value;
+    kept.reserve(blob.bytes.size());
+    for (size_t row = 0; row < blob.rows; ++row) {
+      if (image.is_excluded[row]) continue;
+      const auto bytes = blob.bytes.subspan(row * row_bytes, row_bytes);
+      kept.insert(kept.end(), bytes.begin(), bytes.end());
+      ++num_kept;
+    }
+  }
+  undo.Rewrite(table, image.image_id, num_kept, kept);
+}
+
+struct Counts {
+  uint64_t rows_before = 0;
+  uint64_t rows_after = 0;
+  uint64_t pairs_before = 0;
+  uint64_t pairs_after = 0;
+};
+
+// How the matches of a table change.
+class PairFilter {
+ public:
+  PairFilter(const std::vector<MaskedImage>& images, bool renumber, uint64_t min_num_rows)
+      : images_(images), min_num_rows_(min_num_rows) {
+    if (!renumber) return;
+    for (const MaskedImage& image : images) {
+      new_indices_.push_back(RenumberedIndices(image.is_excluded));
+    }
+  }
+
+  // What remains of the pair's matches.
+  FeatureMatches Filter(const Pair& pair) const {
+    const std::vector<bool>& is_excluded1 = images_[pair.image_idx1].is_excluded;
+    const std::vector<bool>& is_excluded2 = images_[pair.image_idx2].is_excluded;
+    FeatureMatches kept;
+    kept.reserve(pair.matches.size());
+    for (const auto& match : pair.matches) {
+      if (!is_excluded1[match[0]] && !is_excluded2[match[1]]) kept.push_back(match);
+    }
+    if (kept.size() < pair.matches.size() && kept.size() < min_num_rows_) kept.clear();
+    if (new_indices_.empty()) return kept;
+    for (auto& [idx1, idx2] : kept) {
+      idx1 = new_indices_[pair.image_idx1][idx1];
+      idx2 = new_indices_[pair.image_idx2][idx2];
+    }
+    return kept;
+  }
+
+ private:
+  const std::vector<MaskedImage>& images_;
+  uint64_t min_num_rows_;
+  std::vector<std::vector<uint32_t>> new_indices_;
+};
+
+Counts FilterTable(SqliteConnection& connection,
+                   const MaskedTable& table,
+                   const std::vector<MaskedImage>& images,
+                   const PairFilter& filter,
+                   MaskUndo& undo,
+                   ProgressCounter& progress) {
+  Counts counts;
+  PairReader reader(connection, table, images);
+  while (const auto pair = reader.Next()) {
+    const FeatureMatches kept = filter.Filter(*pair);
+    if (kept != pair->matches) undo.Rewrite(table, pair->pair_id, kept.size(), AsBlob(kept));
+    counts.rows_before += pair->matches.size();
+    counts.rows_after += kept.size();
+    counts.pairs_before += !pair->matches.empty();
+    counts.pairs_after += !kept.empty();
+    progress.Advance(1);
+  }
+  return counts;
+}
+
+}  // namespace
+
+uint64_t ExcludeTracks(SqliteConnection& connection,
+                       std::vector<MaskedImage>& images,
+                       ProgressCounter& progress) {
+  Tracks tracks(images, connection.path());
+  PairReader reader(connection, kTwoViewTable, images);
+  while (const auto pair = reader.Next()) {
+    for (const auto& [idx1, idx2] : pair->matches) {
+      tracks.Link(pair->image_idx1, idx1, pair->image_idx2, idx2);
+    }
+    progress.Advance(1);
+  }
+  std::vector<bool> is_excluded_root(tracks.num_keypoints(), false);
+  ForEachKeypoint(images, [&](size_t image_idx, uint32_t idx) {
+    if (images[image_idx].is_excluded[idx]) is_excluded_root[tracks.Root(image_idx, idx)] = true;
+  });
+  uint64_t num_linked = 0;
+  ForEachKeypoint(images, [&](size_t image_idx, uint32_t idx) {
+    auto is_excluded = images[image_idx].is_excluded[idx];
+    if (is_excluded || !is_excluded_root[tracks.Root(image_idx, idx)]) return;
+    is_excluded = true;
+    ++num_linked;
+  });
+  return num_linked;
+}
+
+void RemoveKeypoints(SqliteConnection& connection,
+                     const std::vector<MaskedImage>& images,
+                     MaskUndo& undo,
+                     ProgressCounter& progress) {
+  for (const MaskedImage& image : images) {
+    if (image.summary.num_excluded_keypoints > 0) {
+      RemoveRows(connection, kKeypointsTable, image, undo);
+      RemoveRows(connection, kDescriptorsTable, image, undo);
+    }
+    progress.Advance(1);
+  }
+}
+
+void FilterPairs(SqliteConnection& connection,
+                 const std::vector<MaskedImage>& images,
+                 const FilterPairsOptions& options,
+                 MaskUndo& undo,
+                 ProgressCounter& progress,
+                 ApplyMasksSummary& summary) {
+  const auto filter = [&](const MaskedTable& table, uint64_t min_num_rows) {
+    const PairFilter pair_filter(images, options.renumber, min_num_rows);
+    return FilterTable(connection, table, images, pair_filter, undo, progress);
+  };
+  const Counts matches = filter(kMatchesTable, 0);
+  const Counts inliers = filter(kTwoViewTable, options.min_num_inliers);
+  summary.num_matches_before = matches.rows_before;
+  summary.num_matches_after = matches.rows_after;
+  summary.num_inlier_matches_before = inliers.rows_before;
+  summary.num_inlier_matches_after = inliers.rows_after;
+  summary.num_geometries_before = inliers.pairs_before;
+  summary.num_geometries_after = inliers.pairs_after;
+}
+
+}  // namespace vgtw

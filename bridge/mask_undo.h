@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The original content of rows that masks changed, kept inside the database in a table that COLMAP
+// never reads:
+//   vgtw_mask_undo (undo_id, table_name, row_id, rows, config, applied_hash, data)
+// one row per changed row of keypoints, descriptors (row_id = image_id), matches and
+// two_view_geometries (row_id = pair_id; config is theirs alone). rows, config and data are the
+// original, from before the first ApplyMasks; applied_hash is that of the content that the last one
+// left. NULL there marks a row that somebody else wrote to since; NULL in data one that did not
+// exist then, but would be wrong afterwards, since it names renumbered keypoints.
+#pragma once
+
+#include "bridge/colmap_rows.h"
+#include "bridge/sqlite.h"
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+namespace vgtw {
+
+// A table of COLMAP whose rows masks change.
+struct MaskedTable {
+  const char* name;       // as in the database
+  const char* row_id;     // its primary key
+  const char* row_label;  // in messages
+  size_t bytes_per_value;
+  bool has_config;
+};
+inline constexpr MaskedTable kKeypointsTable = {"keypoints", "image_id", "keypoints", 4, false};
+inline constexpr MaskedTable kDescriptorsTable = {
+    "descriptors", "image_id", "descriptors", 1, false};
+inline constexpr MaskedTable kMatchesTable = {"matches", "pair_id", "matches", 4, false};
+inline constexpr MaskedTable kTwoViewTable = {
+    "two_view_geometries", "pair_id", "two-view geometry", 4, true};
+inline constexpr std::array kMaskedTables = {
+    kKeypointsTable, kDescriptorsTable, kMatchesTable, kTwoViewTable};
+
+// `text` with the names of a table in place of {table}, {row_id}, and {config}: the column of the
+// table `t`, or 0 where it has none.
+std::string MaskedTableSql(std::string text, const MaskedTable& table);
+
+// Writes to rows of a database inside of its transaction, keeping their original if asked to.
+class MaskUndo {
+ public:
+  // Without `keep` an existing table is dropped; with it, rows that others wrote to since the last
+  // run are marked first.
+  MaskUndo(SqliteConnection& connection, bool keep);
+
+  // Replaces rows and data; a two-view geometry without rows gets configuration 0.
+  void Rewrite(const MaskedTable& table, int64_t row_id, size_t rows, BlobBytes data);
+
+ private:
+  void Keep(const MaskedTable& table, int64_t row_id, size_t rows, BlobBytes data);
+
+  SqliteConnection& connection_;
+  bool keep_;
+  bool has_table_;
+};
+
+bool HasMaskUndo(SqliteConnection& connection);
+
+// Marks, in the table, rows that others wrote to since masks were applied.
+void MarkForeignRows(SqliteConnection& connection);
+
+}  // namespace vgtw
