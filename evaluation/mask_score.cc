@@ -188,22 +188,28 @@ MaskRatios RatiosOf(const MaskScore& score) {
           .f1 = score.pixels.Dice(),
           .iou = score.pixels.IoU(),
           .dice = score.pixels.Dice(),
-          .boundary_f = score.boundary.F()};
+          .boundary_f = score.boundary.F(),
+          .on_distractors_per_1000_kept = score.features.OnDistractorsPer1000Kept(),
+          .lost_per_1000_static = score.features.LostPer1000Static()};
 }
 
 MaskRatios MeanRatios(const std::vector<MaskScore>& scores) {
   VGTW_CHECK(!scores.empty(), "there are scores");
+  constexpr double MaskRatios::*kRatios[] = {&MaskRatios::accuracy,
+                                             &MaskRatios::precision,
+                                             &MaskRatios::recall,
+                                             &MaskRatios::f1,
+                                             &MaskRatios::iou,
+                                             &MaskRatios::dice,
+                                             &MaskRatios::boundary_f,
+                                             &MaskRatios::on_distractors_per_1000_kept,
+                                             &MaskRatios::lost_per_1000_static};
   MaskRatios mean;
-  const auto num_scores = static_cast<double>(scores.size());
   for (const MaskScore& score : scores) {
     const MaskRatios ratios = RatiosOf(score);
-    mean.accuracy += ratios.accuracy / num_scores;
-    mean.precision += ratios.precision / num_scores;
-    mean.recall += ratios.recall / num_scores;
-    mean.f1 += ratios.f1 / num_scores;
-    mean.iou += ratios.iou / num_scores;
-    mean.dice += ratios.dice / num_scores;
-    mean.boundary_f += ratios.boundary_f / num_scores;
+    for (const auto ratio : kRatios) {
+      mean.*ratio += ratios.*ratio / static_cast<double>(scores.size());
+    }
   }
   return mean;
 }

@@ -84,6 +84,8 @@ struct MaskRatios {
   double iou = 0.0;
   double dice = 0.0;
   double boundary_f = 0.0;
+  double on_distractors_per_1000_kept = 0.0;  // features
+  double lost_per_1000_static = 0.0;
 };
 MaskRatios RatiosOf(const MaskScore& score);
 

@@ -154,6 +154,9 @@ TEST(ScoreMask, FeaturesByHand) {
   EXPECT_DOUBLE_EQ(score.features.OnDistractorsPer1000Kept(), 2000.0 / 3.0);
   EXPECT_DOUBLE_EQ(score.features.LostPer1000Static(), 500.0);
   EXPECT_EQ(FeatureCounts{}.OnDistractorsPer1000Kept(), 0.0);
+  const MaskRatios mean = MeanRatios({score, MaskScore{}});
+  EXPECT_DOUBLE_EQ(mean.on_distractors_per_1000_kept, 1000.0 / 3.0);
+  EXPECT_DOUBLE_EQ(mean.lost_per_1000_static, 250.0);
 }
 
 // Images of Dice 1 and 0 have a mean of 1/2; pooled, the larger one decides.
