@@ -2,12 +2,12 @@
 #include "bridge/npy.h"
 
 #include "scene/error.h"
+#include "scene/float16.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <charconv>
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <optional>
@@ -175,22 +175,6 @@ T LoadAs(const std::byte* bytes) {
   return value;
 }
 
-float HalfToFloat(uint16_t half) {
-  const int sign = half >> 15;
-  const int exponent = (half >> 10) & 0x1f;
-  const int fraction = half & 0x3ff;
-  float magnitude = 0.0f;
-  if (exponent == 0x1f) {
-    magnitude = fraction == 0 ? std::numeric_limits<float>::infinity()
-                              : std::numeric_limits<float>::quiet_NaN();
-  } else if (exponent == 0) {
-    magnitude = std::ldexp(static_cast<float>(fraction), -24);
-  } else {
-    magnitude = std::ldexp(static_cast<float>(fraction + 1024), exponent - 25);
-  }
-  return sign == 0 ? magnitude : -magnitude;
-}
-
 template <typename T>
 T ConvertValue(NpyType type, const std::byte* bytes) {
   switch (type) {
@@ -203,7 +187,7 @@ T ConvertValue(NpyType type, const std::byte* bytes) {
     case NpyType::kInt64:
       return static_cast<T>(LoadAs<int64_t>(bytes));
     case NpyType::kFloat16:
-      return static_cast<T>(HalfToFloat(LoadAs<uint16_t>(bytes)));
+      return static_cast<T>(FloatOfHalf(LoadAs<uint16_t>(bytes)));
     case NpyType::kFloat32:
       return static_cast<T>(LoadAs<float>(bytes));
     case NpyType::kFloat64:

@@ -4,10 +4,10 @@
 #include "bridge/predictions_json.h"
 #include "scene/error.h"
 #include "scene/files.h"
+#include "scene/float16.h"
 #include "scene/safetensors.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
 #include <set>
 #include <stdexcept>
@@ -156,9 +156,7 @@ void WriteMaps(const ViewPrediction& prediction, const fs::path& path) {
   std::transform(prediction.distractor.data().begin(),
                  prediction.distractor.data().end(),
                  distractor.begin(),
-                 [](float probability) {
-                   return Eigen::numext::bit_cast<uint16_t>(Eigen::half(probability));
-                 });
+                 HalfOfFloat);
   std::vector<float> samples;
   samples.reserve(kSampleSize * prediction.depth_samples.size());
   for (const DepthSample& sample : prediction.depth_samples) {

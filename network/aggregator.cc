@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "network/aggregator.h"
 
+#include "network/model.h"
 #include "scene/error.h"
 
 #include <ATen/ATen.h>
@@ -22,21 +23,8 @@ at::Tensor ForFirstAndOthers(const at::Tensor& tokens, int64_t num_views) {
 
 }  // namespace
 
-at::Tensor ExcludedTokens(const at::Tensor& excluded_patches) {
-  if (!excluded_patches.defined()) return {};
-  return at::cat(
-      {at::zeros({excluded_patches.size(0), kNumSpecialTokens}, excluded_patches.options()),
-       excluded_patches},
-      1);
-}
-
-at::Tensor GlobalInputOf(const at::Tensor& tokens) {
-  return tokens.slice(2, 0, tokens.size(2) / 2).reshape({1, -1, tokens.size(2) / 2});
-}
-
 Aggregator::Aggregator(const ParameterScope& scope, const VggtConfig& config)
-    : head_dim_(config.dim / config.num_heads),
-      camera_token_(scope.Get("camera_token", {1, 2, 1, config.dim})),
+    : camera_token_(scope.Get("camera_token", {1, 2, 1, config.dim})),
       registers_(scope.Get("register_token", {1, 2, kNumSpecialTokens - 1, config.dim})) {
   const ParameterScope embedding = scope["patch_embed"];
   if (config.encoder) {
@@ -54,28 +42,13 @@ Aggregator::Aggregator(const ParameterScope& scope, const VggtConfig& config)
 }
 
 at::Tensor Aggregator::Embed(const at::Tensor& images) const {
-  const ChannelStatistics statistics = ImageNetStatistics(images.device());
-  const at::Tensor normalised = (images - statistics.mean) / statistics.deviation;
+  const at::Tensor normalised = NormaliseImages(images);
   const at::Tensor patches = encoder_ ? (*encoder_)(normalised) : (*patch_embedding_)(normalised);
   const int64_t num_views = images.size(0);
   return at::cat({ForFirstAndOthers(camera_token_, num_views),
                   ForFirstAndOthers(registers_, num_views),
                   AtLeastFloat(patches)},
                  1);
-}
-
-at::Tensor Aggregator::GlobalAttentionOf(int64_t view,
-                                         int64_t token,
-                                         int64_t layer,
-                                         const at::Tensor& tokens,
-                                         int64_t height,
-                                         int64_t width) const {
-  const at::Tensor frame = GlobalInputOf(tokens);
-  const RotaryTable rotary = MakeRotaryTable(
-      kNumSpecialTokens, height / kPatchSize, width / kPatchSize, head_dim_, frame.device());
-  return global_blocks_.at(static_cast<size_t>(layer))
-      .AttentionWeightsOf(view * tokens.size(1) + token, frame, &rotary)
-      .view({tokens.size(0), tokens.size(1)});
 }
 
 void Aggregator::operator()(const at::Tensor& images,
@@ -85,7 +58,7 @@ void Aggregator::operator()(const at::Tensor& images,
   const RotaryTable rotary = MakeRotaryTable(kNumSpecialTokens,
                                              images.size(2) / kPatchSize,
                                              images.size(3) / kPatchSize,
-                                             head_dim_,
+                                             frame_blocks_.front().head_dim(),
                                              images.device());
   const at::Tensor excluded = ExcludedTokens(excluded_patches);
   const at::Tensor excluded_anywhere = excluded.defined() ? excluded.view({1, -1}) : excluded;

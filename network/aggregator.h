@@ -28,20 +28,14 @@ class Aggregator {
                   const OnLayer& on_layer,
                   const at::Tensor& excluded_patches = {}) const;
 
-  // See Model::GlobalAttentionOf.
-  at::Tensor GlobalAttentionOf(int64_t view,
-                               int64_t token,
-                               int64_t layer,
-                               const at::Tensor& tokens,
-                               int64_t height,
-                               int64_t width) const;
-
+  const TransformerBlock& global_block(int64_t layer) const {
+    return global_blocks_.at(static_cast<size_t>(layer));
+  }
   const std::optional<VisionTransformer>& encoder() const { return encoder_; }
 
  private:
   at::Tensor Embed(const at::Tensor& images) const;
 
-  int64_t head_dim_;
   std::optional<VisionTransformer> encoder_;
   std::optional<PatchEmbedding> patch_embedding_;
   at::Tensor camera_token_;
@@ -49,11 +43,5 @@ class Aggregator {
   std::vector<TransformerBlock> frame_blocks_;
   std::vector<TransformerBlock> global_blocks_;
 };
-
-// What the global block of a layer read, [1, S * T, E]: the first half of its tokens [S, T, 2 E].
-at::Tensor GlobalInputOf(const at::Tensor& tokens);
-
-// Which tokens of [S, 5 + P] to leave out of attention, from patches [S, P]; undefined stays so.
-at::Tensor ExcludedTokens(const at::Tensor& excluded_patches);
 
 }  // namespace vgtw

@@ -2,6 +2,7 @@
 #include "network/checkpoint_convert.h"
 
 #include "scene/error.h"
+#include "scene/float16.h"
 
 #include <algorithm>
 #include <bit>
@@ -12,8 +13,6 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
-
 namespace vgtw {
 namespace {
 
@@ -22,23 +21,6 @@ constexpr size_t kChunkElements = size_t{1} << 18;
 bool IsFloating(TensorType type) {
   return type == TensorType::kF64 || type == TensorType::kF32 || type == TensorType::kF16 ||
          type == TensorType::kBF16;
-}
-
-float FloatOfHalf(uint16_t bits) {
-  return static_cast<float>(Eigen::numext::bit_cast<Eigen::half>(bits));
-}
-
-uint16_t HalfOfFloat(float value) {
-  return Eigen::numext::bit_cast<uint16_t>(static_cast<Eigen::half>(value));
-}
-
-float FloatOfBrain(uint16_t bits) { return std::bit_cast<float>(uint32_t{bits} << 16); }
-
-uint16_t BrainOfFloat(float value) {
-  const auto bits = std::bit_cast<uint32_t>(value);
-  constexpr uint32_t kQuietBit = 0x40;  // a NaN whose upper half is empty must not become infinite
-  if (std::isnan(value)) return static_cast<uint16_t>(bits >> 16 | kQuietBit);
-  return static_cast<uint16_t>((bits + 0x7fff + (bits >> 16 & 1)) >> 16);
 }
 
 // Rounds to the neighbour whose last bit is 1 unless exact. A float has more than two bits more
@@ -53,17 +35,9 @@ float RoundToOdd(double value) {
 
 // Elements `begin` to `begin + values.size()` of a tensor of F32, F16 or BF16.
 void LoadFloats(const StoredTensor& tensor, size_t begin, std::vector<float>& values) {
-  const std::byte* bytes = tensor.bytes.data() + begin * SizeInBytes(tensor.type);
-  if (tensor.type == TensorType::kF32) {
-    std::memcpy(values.data(), bytes, values.size() * sizeof(float));
-    return;
-  }
-  const auto to_float = tensor.type == TensorType::kF16 ? FloatOfHalf : FloatOfBrain;
-  for (size_t i = 0; i < values.size(); ++i) {
-    uint16_t bits = 0;
-    std::memcpy(&bits, bytes + i * sizeof(bits), sizeof(bits));
-    values[i] = to_float(bits);
-  }
+  const size_t size = SizeInBytes(tensor.type);
+  values = ToFloats(
+      {tensor.type, {values.size()}, tensor.bytes.subspan(begin * size, values.size() * size)});
 }
 
 // The same for F64; whether a finite value became infinite.

@@ -5,6 +5,7 @@
 #include "scene/error.h"
 
 #include <cmath>
+#include <limits>
 
 #include <ATen/ATen.h>
 
@@ -67,13 +68,13 @@ at::Tensor Upsampling::operator()(const at::Tensor& x) const {
 
 Attention::Attention(const ParameterScope& scope, const AttentionConfig& config)
     : num_heads_(config.num_heads),
+      head_dim_(config.dim / config.num_heads),
       qkv_(scope["qkv"], config.dim, 3 * config.dim),
       proj_(scope["proj"], config.dim, config.dim) {
   VGTW_CHECK(config.dim % config.num_heads == 0, "attention heads");
   if (config.has_qk_norm) {
-    const int64_t head_dim = config.dim / config.num_heads;
-    q_norm_.emplace(scope["q_norm"], head_dim, kQkNormEps);
-    k_norm_.emplace(scope["k_norm"], head_dim, kQkNormEps);
+    q_norm_.emplace(scope["q_norm"], head_dim_, kQkNormEps);
+    k_norm_.emplace(scope["k_norm"], head_dim_, kQkNormEps);
   }
   if (!config.lora) return;
   const Shape down = {config.lora->rank, config.dim};
@@ -84,7 +85,7 @@ Attention::Attention(const ParameterScope& scope, const AttentionConfig& config)
 }
 
 at::Tensor Attention::ToHeads(const at::Tensor& x) const {
-  return x.reshape({x.size(0), x.size(1), num_heads_, -1}).transpose(1, 2);
+  return x.reshape({x.size(0), x.size(1), num_heads_, head_dim_}).transpose(1, 2);
 }
 
 at::Tensor Attention::Update(const Lora& lora, const at::Tensor& x) const {
@@ -120,12 +121,16 @@ at::Tensor Attention::operator()(const at::Tensor& x,
 
 at::Tensor Attention::WeightsOf(int64_t query,
                                 const at::Tensor& x,
-                                const RotaryTable* rotary) const {
+                                const RotaryTable* rotary,
+                                const at::Tensor& excluded_keys) const {
   const Projections heads = Project(x, rotary);
   const at::Tensor q = AtLeastFloat(heads.q[0].slice(1, query, query + 1));  // [heads, 1, d]
   const at::Tensor k = AtLeastFloat(heads.k[0]);
-  const double scale = 1.0 / std::sqrt(static_cast<double>(q.size(2)));
-  return at::softmax(at::bmm(q, k.transpose(1, 2)) * scale, 2).mean(0).squeeze(0);
+  at::Tensor logits = at::bmm(q, k.transpose(1, 2)) / std::sqrt(static_cast<double>(head_dim_));
+  if (excluded_keys.defined()) {
+    logits = logits.masked_fill(excluded_keys, -std::numeric_limits<double>::infinity());
+  }
+  return at::softmax(logits, 2).mean(0).squeeze(0);
 }
 
 TransformerBlock::TransformerBlock(const ParameterScope& scope, const BlockConfig& config)

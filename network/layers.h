@@ -94,7 +94,12 @@ class Attention {
                         const RotaryTable* rotary,
                         const at::Tensor& excluded_keys = {}) const;
   // How much token `query` of x [1, N, dim] attends to each token: [N], mean over the heads.
-  at::Tensor WeightsOf(int64_t query, const at::Tensor& x, const RotaryTable* rotary) const;
+  at::Tensor WeightsOf(int64_t query,
+                       const at::Tensor& x,
+                       const RotaryTable* rotary,
+                       const at::Tensor& excluded_keys = {}) const;
+
+  int64_t head_dim() const { return head_dim_; }
 
  private:
   struct Projections {
@@ -109,6 +114,7 @@ class Attention {
   at::Tensor Update(const Lora& lora, const at::Tensor& x) const;
 
   int64_t num_heads_;
+  int64_t head_dim_;
   Linear qkv_;
   Linear proj_;
   std::optional<LayerNorm> q_norm_;
@@ -135,9 +141,12 @@ class TransformerBlock {
   // The attention inside this block, see Attention::WeightsOf.
   at::Tensor AttentionWeightsOf(int64_t query,
                                 const at::Tensor& x,
-                                const RotaryTable* rotary) const {
-    return attention_.WeightsOf(query, norm1_(x), rotary);
+                                const RotaryTable* rotary,
+                                const at::Tensor& excluded_keys = {}) const {
+    return attention_.WeightsOf(query, norm1_(x), rotary, excluded_keys);
   }
+
+  int64_t head_dim() const { return attention_.head_dim(); }
 
  private:
   LayerNorm norm1_;

@@ -2,6 +2,8 @@
 // What all networks have in common. Internal to network/: needs LibTorch.
 #pragma once
 
+#include "network/layers.h"
+
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -47,6 +49,11 @@ struct DenseOutputs {
   at::Tensor distractor_logits = {};  // [n, H, W]
 };
 
+struct MapChoice {
+  // VGGT's and VGTW's points have a head of their own, as costly as depth; pi3's come with depth.
+  bool points = true;
+};
+
 class Model {
  public:
   virtual ~Model() = default;
@@ -55,17 +62,19 @@ class Model {
   virtual CameraOutputs PredictCameras(const Features& features) const = 0;
   // Maps of the views begin .. end - 1: no view needs the others, so few at a time bound the
   // memory.
-  virtual DenseOutputs PredictMaps(const Features& features, int64_t begin, int64_t end) const = 0;
-  // How much token `token` of view `view` attends to every token of all views in the global block
-  // of `layer`: [S, 5 + P], mean over the heads, sum 1. `tokens` [S, 5 + P, 2 E] are that layer's,
-  // as EncodeOptions::on_layer gave them, of an image of height x width pixels.
-  virtual at::Tensor GlobalAttentionOf(int64_t view,
-                                       int64_t token,
-                                       int64_t layer,
-                                       const at::Tensor& tokens,
-                                       int64_t height,
-                                       int64_t width) const = 0;
+  virtual DenseOutputs PredictMaps(const Features& features,
+                                   int64_t begin,
+                                   int64_t end,
+                                   const MapChoice& choice) const = 0;
+  // The block of `layer` that looks across all views; throws std::out_of_range.
+  virtual const TransformerBlock& GlobalBlock(int64_t layer) const = 0;
 };
+
+// Which tokens of [S, 5 + P] to leave out of attention, from patches [S, P]; undefined stays so.
+at::Tensor ExcludedTokens(const at::Tensor& excluded_patches);
+
+// What the global block of a layer read, [1, S * T, E]: the first half of its tokens [S, T, 2 E].
+at::Tensor GlobalInputOf(const at::Tensor& tokens);
 
 // The four layers of the views begin .. end - 1.
 std::array<at::Tensor, 4> SliceViews(const Features& features, int64_t begin, int64_t end);

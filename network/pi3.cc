@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "network/pi3.h"
 
-#include "network/aggregator.h"
 #include "network/camera_geometry.h"
 
 #include <ATen/ATen.h>
@@ -153,7 +152,10 @@ CameraOutputs Pi3::PredictCameras(const Features& features) const {
   return {.cam_from_world = InvertPoses(world_from_cam.slice(1, 0, 3))};
 }
 
-DenseOutputs Pi3::PredictMaps(const Features& features, int64_t begin, int64_t end) const {
+DenseOutputs Pi3::PredictMaps(const Features& features,
+                              int64_t begin,
+                              int64_t end,
+                              const MapChoice&) const {
   const at::Tensor tokens = features.last.slice(0, begin, end);
   const RotaryTable rotary = RotaryOf(features, config_.head_dim / config_.num_head_heads);
   const auto to_pixels = [&](const Pi3Decoder& decoder, const Linear& head) {
@@ -174,20 +176,8 @@ DenseOutputs Pi3::PredictMaps(const Features& features, int64_t begin, int64_t e
   return outputs;
 }
 
-at::Tensor Pi3::GlobalAttentionOf(int64_t view,
-                                  int64_t token,
-                                  int64_t layer,
-                                  const at::Tensor& tokens,
-                                  int64_t height,
-                                  int64_t width) const {
-  const RotaryTable rotary = MakeRotaryTable(kNumSpecialTokens,
-                                             height / kPatchSize,
-                                             width / kPatchSize,
-                                             config_.encoder.dim / config_.encoder.num_heads,
-                                             tokens.device());
-  return decoder_.at(static_cast<size_t>(2 * layer + 1))
-      .AttentionWeightsOf(view * tokens.size(1) + token, GlobalInputOf(tokens), &rotary)
-      .view({tokens.size(0), tokens.size(1)});
+const TransformerBlock& Pi3::GlobalBlock(int64_t layer) const {
+  return decoder_.at(static_cast<size_t>(2 * layer + 1));
 }
 
 }  // namespace vgtw

@@ -50,13 +50,11 @@ class Pi3 : public Model {
 
   Features Encode(const at::Tensor& images, const EncodeOptions& options) const override;
   CameraOutputs PredictCameras(const Features& features) const override;
-  DenseOutputs PredictMaps(const Features& features, int64_t begin, int64_t end) const override;
-  at::Tensor GlobalAttentionOf(int64_t view,
-                               int64_t token,
-                               int64_t layer,
-                               const at::Tensor& tokens,
-                               int64_t height,
-                               int64_t width) const override;
+  DenseOutputs PredictMaps(const Features& features,
+                           int64_t begin,
+                           int64_t end,
+                           const MapChoice& choice) const override;
+  const TransformerBlock& GlobalBlock(int64_t layer) const override;
 
   // What lies between, for tests: patches [S, P, E] of the encoder, tokens of the camera decoder.
   at::Tensor EncodePatches(const at::Tensor& images) const;

@@ -2,16 +2,16 @@
 #include "network/predict.h"
 
 #include "network/predict_run.h"
+#include "network/probe_run.h"
+#include "network/runtime.h"
 #include "network/vggt.h"
 #include "network/weights.h"
 #include "scene/error.h"
-#include "scene/parallel.h"
 
 #include <cmath>
 #include <utility>
 
 #include <ATen/ATen.h>
-#include <ATen/Parallel.h>
 #include <c10/util/Exception.h>
 
 namespace vgtw {
@@ -45,8 +45,7 @@ at::ScalarType ProductType(Precision precision, const at::Device& device) {
 }
 
 at::Tensor DescribeViews(const VisionTransformer& encoder, const at::Tensor& images) {
-  const ChannelStatistics statistics = ImageNetStatistics(images.device());
-  return encoder((images - statistics.mean) / statistics.deviation).to(at::kFloat).mean(1);
+  return encoder(NormaliseImages(images)).to(at::kFloat).mean(1);
 }
 
 // LibTorch's messages are a line, then a stack.
@@ -91,7 +90,7 @@ Predictor::Predictor(const std::vector<std::filesystem::path>& weights,
   load.product_type = ProductType(options.precision, load.device);
   load.num_threads = options.num_threads;
   // Loading converts types, which is LibTorch's work.
-  at::set_num_threads(ResolveThreads(options.num_threads));
+  UseThreads(options.num_threads);
   impl_.reset(new Impl{options, WithPlainErrors([&] { return LoadNetwork(weights, load); }), {}});
   const LoadedNetwork& loaded = impl_->loaded;
   ReadyNetwork& network = impl_->network;
@@ -124,6 +123,15 @@ PredictSummary Predictor::Run(const std::filesystem::path& image_folder,
   return WithPlainErrors([&] {
     return PredictViews(
         impl_->network, impl_->options, image_folder, image_names, on_prediction, progress);
+  });
+}
+
+ProbeSummary Predictor::Probe(const std::filesystem::path& image_folder,
+                              const std::vector<std::string>& image_names,
+                              const ProbeRequest& request,
+                              const ProgressCallback& progress) const {
+  return WithPlainErrors([&] {
+    return ProbeViews(impl_->network, impl_->options, image_folder, image_names, request, progress);
   });
 }
 

@@ -2,8 +2,11 @@
 #pragma once
 
 #include "network/identify.h"
+#include "scene/distractor_mask.h"
+#include "scene/grid.h"
 #include "scene/prediction.h"
 #include "scene/progress.h"
+#include "scene/view.h"
 
 #include <cstdint>
 #include <filesystem>
@@ -12,6 +15,8 @@
 #include <optional>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
 
 namespace vgtw {
 
@@ -36,7 +41,11 @@ struct PredictOptions {
   double max_memory_gib = 0.0;  // of the process, or of the GPU; 0 = what is free, less a reserve
   ReferenceChoice reference = ReferenceChoice::kFirst;
   bool with_points = false;  // also ViewPrediction::points, as the network's point head says
-  int num_threads = 0;       // 0 = all cores
+  // Masks of known distractors, in the photos' pixels; an empty one = none known in this photo. No
+  // patch attends to one that is at least half excluded (the paper's probe, section 3.2), and
+  // excluded pixels get distractor probability 1. Called from several threads.
+  std::function<StaticMask(const std::string& image_name)> read_static_mask = {};
+  int num_threads = 0;  // 0 = all cores
 
   // Throws std::invalid_argument naming the field that is out of its range.
   void Check() const;
@@ -66,6 +75,33 @@ struct PredictSummary {
   std::vector<std::string> rejected_views;  // with the reason
 };
 
+// Whose attention to look at: the patch of this pixel.
+struct ProbeRequest {
+  std::string image_name;
+  Eigen::Vector2d pixel_in_original = Eigen::Vector2d::Zero();
+  // Pairs of a block within views and a block across them, counted from 0; none = the last.
+  std::vector<int64_t> layers;
+};
+
+// One value per patch [rows, columns], by view in the order of the photos.
+struct ProbedLayer {
+  int64_t layer = 0;
+  std::vector<Grid<float>> similarity;  // cosine of the layer's tokens with the query's, -1 .. 1
+  std::vector<Grid<float>> attention;   // of the query to that patch, mean over the heads
+  double special_attention = 0.0;       // to camera and register tokens; with all patches 1
+  double distractor_attention = 0.0;    // to patches that the masks exclude
+};
+
+struct ProbeSummary {
+  std::vector<ProbedLayer> layers;  // as the network is
+  std::vector<ProbedLayer>
+      masked_layers;  // while nothing attends to excluded patches; if there are masks
+  std::vector<PixelMap> original_from_patch;  // by view; patch (column, row) ends at + 1
+  size_t query_view = 0;
+  int64_t query_row = 0;
+  int64_t query_column = 0;
+};
+
 // Photos to predictions.
 class Predictor {
  public:
@@ -87,6 +123,13 @@ class Predictor {
   PredictSummary Run(const std::filesystem::path& image_folder,
                      const std::vector<std::string>& image_names,
                      const std::function<void(const ViewPrediction&)>& on_prediction,
+                     const ProgressCallback& progress = {}) const;
+
+  // All photos in one pass, the first as reference. Throws Error as Run does, if the photos do not
+  // fit into memory, or if the query or a layer does not exist.
+  ProbeSummary Probe(const std::filesystem::path& image_folder,
+                     const std::vector<std::string>& image_names,
+                     const ProbeRequest& request,
                      const ProgressCallback& progress = {}) const;
 
  private:

@@ -20,17 +20,6 @@ at::Tensor ToCpu(const at::Tensor& tensor, at::ScalarType type) {
   return tensor.to(at::kCPU, type).contiguous();
 }
 
-Grid<float> ToGrid(const at::Tensor& map) {
-  if (!map.defined()) return {};
-  const at::Tensor values = ToCpu(map, at::kFloat);
-  Grid<float> grid(static_cast<int>(values.size(1)), static_cast<int>(values.size(0)));
-  const float* first = values.data_ptr<float>();
-  std::transform(first, first + grid.size(), grid.data().begin(), [](float value) {
-    return std::isfinite(value) ? value : kUnknown;
-  });
-  return grid;
-}
-
 Grid<Eigen::Vector3f> ToPointGrid(const at::Tensor& points) {
   if (!points.defined()) return {};
   const at::Tensor values = ToCpu(points, at::kFloat);
@@ -123,6 +112,17 @@ void SetMaps(const RawView& raw, bool with_points, ViewPrediction& prediction) {
 }
 
 }  // namespace
+
+Grid<float> ToGrid(const at::Tensor& map) {
+  if (!map.defined()) return {};
+  const at::Tensor values = ToCpu(map, at::kFloat);
+  Grid<float> grid(static_cast<int>(values.size(1)), static_cast<int>(values.size(0)));
+  const float* first = values.data_ptr<float>();
+  std::transform(first, first + grid.size(), grid.data().begin(), [](float value) {
+    return std::isfinite(value) ? value : kUnknown;
+  });
+  return grid;
+}
 
 RawView SelectView(const CameraOutputs& cameras,
                    int64_t camera_idx,

@@ -12,6 +12,9 @@
 
 namespace vgtw {
 
+// [H, W] on any device; what is not finite becomes NaN; undefined becomes empty.
+Grid<float> ToGrid(const at::Tensor& map);
+
 // Outputs of one view, without the leading dimension of CameraOutputs and DenseOutputs.
 struct RawView {
   at::Tensor cam_from_world;  // [3, 4]

@@ -20,14 +20,4 @@ struct MemoryEstimate {
 };
 MemoryEstimate EstimateMemory(const NetworkDescription& description, int width, int height);
 
-// Bytes of memory that this process may still take: what the machine has free, or less if the
-// control group of the process allows less.
-int64_t AvailableMemory();
-
-// Largest resident size that this process ever had, in bytes; mapped files count.
-int64_t PeakMemory();
-
-// Its resident size now.
-int64_t ResidentMemory();
-
 }  // namespace vgtw

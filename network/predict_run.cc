@@ -5,24 +5,22 @@
 #include "network/predict_chunks.h"
 #include "network/predict_convert.h"
 #include "network/predict_memory.h"
-#include "network/preprocess.h"
+#include "network/runtime.h"
 #include "scene/error.h"
-#include "scene/parallel.h"
+#include "scene/memory.h"
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <numeric>
 
 #include <ATen/ATen.h>
-#include <ATen/Parallel.h>
 #include <c10/core/InferenceMode.h>
 
 namespace vgtw {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kGib = 1024.0 * 1024.0 * 1024.0;
 
 // Work in units of one layer of the trunk on one view, by count of operations.
 struct WorkUnits {
@@ -42,22 +40,20 @@ WorkUnits WorkUnitsOf(const NetworkDescription& description) {
   return {pi3.depth / 2, pi3.encoder.depth / 2, kHeads};
 }
 
-PreprocessOptions LoaderOf(const NetworkDescription& description, const PredictOptions& options) {
-  PreprocessOptions loader;
-  const bool is_vggt = std::holds_alternative<VggtConfig>(description.config);
-  loader.policy = is_vggt ? ResizePolicy::kCrop : ResizePolicy::kStretch;
-  loader.side_px = options.side_px;
-  loader.max_pixels = options.max_pixels;
-  return loader;
-}
-
-// [3, H, W] in [0, 1]
-at::Tensor ToTensor(const RgbImage& image) {
-  static_assert(sizeof(Rgb) == 3, "pixels lie one after the other");
-  const at::Tensor bytes = at::from_blob(const_cast<Rgb*>(image.data().data()),
-                                         {image.height(), image.width(), 3},
-                                         at::TensorOptions(at::kByte));
-  return bytes.permute({2, 0, 1}).to(at::kFloat).div_(255.0);
+// The memory that a pass may take beside what the process holds already.
+int64_t MemoryForPass(const ReadyNetwork& network, double max_memory_gib) {
+  constexpr double kUsableShare = 0.9;
+  const auto limit = static_cast<int64_t>(max_memory_gib * kGib);
+  if (network.device.is_cuda()) {
+    const std::vector<Gpu> gpus = ListGpus();
+    const auto idx = static_cast<size_t>(std::max<int>(0, network.device.index()));
+    const double on_board = idx < gpus.size() ? static_cast<double>(gpus[idx].memory_bytes) : 0.0;
+    const int64_t total = limit > 0 ? limit : static_cast<int64_t>(kUsableShare * on_board);
+    return total - network.weights_bytes;
+  }
+  if (network.release_memory) network.release_memory();
+  if (limit > 0) return limit - ResidentMemory();
+  return static_cast<int64_t>(kUsableShare * static_cast<double>(AvailableMemory()));
 }
 
 class Stopwatch {
@@ -74,6 +70,15 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+// What is masked is known to be a distractor, whatever the network says of it.
+// excluded [H, W]; maps of one view.
+void AddKnownDistractors(const at::Tensor& excluded, DenseOutputs& maps) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  at::Tensor& logits = maps.distractor_logits;
+  if (!logits.defined()) logits = at::full_like(maps.depth, -kInfinity);
+  logits = logits.masked_fill(excluded.to(logits.device()), kInfinity);
+}
+
 class PredictRun {
  public:
   PredictRun(const ReadyNetwork& network,
@@ -84,17 +89,20 @@ class PredictRun {
              const ProgressCallback& progress)
       : network_(network),
         options_(options),
-        image_folder_(image_folder),
-        image_names_(image_names),
         on_prediction_(on_prediction),
         progress_(progress),
-        loader_(LoaderOf(network.description, options)),
+        photos_(
+            image_folder, image_names, LoaderOf(network.description, options), options.num_threads),
         work_(WorkUnitsOf(network.description)) {}
 
   PredictSummary Run() {
-    Place();
+    summary_.network_width = photos_.network_width();
+    summary_.network_height = photos_.network_height();
+    const int num_views_at_once = options_.max_views_at_once > 0
+                                      ? options_.max_views_at_once
+                                      : MaxViewsAtOnce(network_, options_.max_memory_gib, photos_);
     const std::vector<ViewChunk> chunks =
-        PlanChunks(static_cast<int>(image_names_.size()), MaxViews(), options_.num_overlap_views);
+        PlanChunks(photos_.num_views(), num_views_at_once, options_.num_overlap_views);
     for (const ViewChunk& chunk : chunks) total_ += (chunk.end - chunk.begin) * work_.OfView();
     for (const ViewChunk& chunk : chunks) RunChunk(chunk, chunks.size() > 1);
     summary_.peak_memory_gib = static_cast<double>(PeakMemory()) / kGib;
@@ -107,66 +115,12 @@ class PredictRun {
     Features features;
     CameraOutputs cameras;
     std::vector<int64_t> rank;  // by view - chunk.begin
+    at::Tensor excluded;        // [S, H, W], by view - chunk.begin; undefined without masks
   };
 
-  void Place() {
-    std::vector<ImageSize> sizes(image_names_.size());
-    ParallelFor(static_cast<int64_t>(sizes.size()), options_.num_threads, [&](int64_t i) {
-      const fs::path path = image_folder_ / image_names_[static_cast<size_t>(i)];
-      const ImageSize size = ReadImageSize(path);
-      const std::string fault = FindFault(size, loader_);
-      if (!fault.empty()) Fail(path, "has " + fault, "a photo", "leave it out");
-      sizes[static_cast<size_t>(i)] = size;
-    });
-    placements_ = PlacePhotos(sizes, loader_);
-    summary_.network_width = placements_.front().geometry.network_width;
-    summary_.network_height = placements_.front().geometry.network_height;
-  }
-
-  // The memory that a pass may take beside what the process holds already.
-  int64_t MemoryForPass() const {
-    constexpr double kUsableShare = 0.9;
-    const auto limit = static_cast<int64_t>(options_.max_memory_gib * kGib);
-    if (network_.device.is_cuda()) {
-      const std::vector<Gpu> gpus = ListGpus();
-      const auto idx = static_cast<size_t>(std::max<int>(0, network_.device.index()));
-      const double on_board = idx < gpus.size() ? static_cast<double>(gpus[idx].memory_bytes) : 0.0;
-      const int64_t total = limit > 0 ? limit : static_cast<int64_t>(kUsableShare * on_board);
-      return total - network_.weights_bytes;
-    }
-    if (network_.release_memory) network_.release_memory();
-    if (limit > 0) return limit - ResidentMemory();
-    return static_cast<int64_t>(kUsableShare * static_cast<double>(AvailableMemory()));
-  }
-
-  int MaxViews() const {
-    if (options_.max_views_at_once > 0) return options_.max_views_at_once;
-    const auto num_views = static_cast<int64_t>(image_names_.size());
-    const MemoryEstimate need =
-        EstimateMemory(network_.description, summary_.network_width, summary_.network_height);
-    const int64_t fitting = (MemoryForPass() - need.fixed) / need.per_view;
-    if (fitting < std::min<int64_t>(2, num_views)) {
-      const double missing = static_cast<double>(need.fixed + 2 * need.per_view - MemoryForPass());
-      throw Error("memory: two views of " + std::to_string(summary_.network_width) + "x" +
-                  std::to_string(summary_.network_height) + " pixels do not fit, " +
-                  std::to_string(static_cast<int64_t>(missing / kGib * 1024.0) + 1) +
-                  " MiB more are needed; raise --max_memory or use smaller images (--side_px)");
-    }
-    return static_cast<int>(std::min(fitting, num_views));
-  }
-
-  // [S, 3, H, W] on the CPU
   at::Tensor LoadImages(const ViewChunk& chunk) {
     const Stopwatch stopwatch(summary_.load_sec);
-    const at::Tensor images = at::empty(
-        {chunk.end - chunk.begin, 3, summary_.network_height, summary_.network_width}, at::kFloat);
-    ParallelFor(chunk.end - chunk.begin, options_.num_threads, [&](int64_t i) {
-      const c10::InferenceMode inference;  // a mode is its thread's own
-      const auto view = static_cast<size_t>(chunk.begin + i);
-      const RgbImage photo = ReadRgbImageOnWhite(image_folder_ / image_names_[view]);
-      images[i].copy_(ToTensor(MakeNetworkImage(photo, placements_[view], loader_)));
-    });
-    return images;
+    return photos_.Load(chunk.begin, chunk.end);
   }
 
   // Encodes a chunk with its reference in front.
@@ -176,6 +130,11 @@ class PredictRun {
     const int64_t num_views = images.size(0);
     const int64_t reference = ReferenceOf(images);
     Pass pass;
+    EncodeOptions encode;
+    if (options_.read_static_mask) {
+      pass.excluded = photos_.LoadExcluded(chunk.begin, chunk.end, options_.read_static_mask);
+      encode.excluded_patches = ExcludedPatches(pass.excluded).to(network_.device);
+    }
     pass.rank.resize(static_cast<size_t>(num_views));
     std::iota(pass.rank.begin(), pass.rank.end(), 0);
     if (reference > 0) {
@@ -184,10 +143,13 @@ class PredictRun {
       for (size_t i = 0; i < order.size(); ++i) {
         pass.rank[static_cast<size_t>(order[i])] = static_cast<int64_t>(i);
       }
-      images = images.index_select(0, at::tensor(order).to(images.device()));
+      const at::Tensor indices = at::tensor(order).to(images.device());
+      images = images.index_select(0, indices);
+      if (encode.excluded_patches.defined()) {
+        encode.excluded_patches = encode.excluded_patches.index_select(0, indices);
+      }
     }
     int64_t pending = work_.encoder;
-    EncodeOptions encode;
     encode.on_layer = [&](int64_t, const at::Tensor&) {
       if (network_.release_memory) network_.release_memory();
       Advance(num_views * (1 + std::exchange(pending, 0)));
@@ -213,9 +175,11 @@ class PredictRun {
   ConvertedView Convert(const ViewChunk& chunk, const Pass& pass, int view) {
     const Stopwatch stopwatch(summary_.heads_sec);
     const int64_t rank = pass.rank[static_cast<size_t>(view - chunk.begin)];
-    const DenseOutputs maps = network_.model->PredictMaps(pass.features, rank, rank + 1);
-    ConvertedView converted = ConvertView(image_names_[static_cast<size_t>(view)],
-                                          placements_[static_cast<size_t>(view)],
+    DenseOutputs maps = network_.model->PredictMaps(
+        pass.features, rank, rank + 1, {.points = options_.with_points});
+    if (pass.excluded.defined()) AddKnownDistractors(pass.excluded[view - chunk.begin], maps);
+    ConvertedView converted = ConvertView(photos_.name(view),
+                                          photos_.placement(view),
                                           SelectView(pass.cameras, rank, maps, 0),
                                           options_.with_points);
     Advance(work_.heads);
@@ -231,8 +195,7 @@ class PredictRun {
     for (int view = chunk.begin + chunk.num_shared_views; view < chunk.end; ++view) {
       ConvertedView converted = Convert(chunk, pass, view);
       if (!converted.fault.empty()) {
-        summary_.rejected_views.push_back(image_names_[static_cast<size_t>(view)] + ": " +
-                                          converted.fault);
+        summary_.rejected_views.push_back(photos_.name(view) + ": " + converted.fault);
         continue;
       }
       TransformPrediction(world_from_chunk, converted.prediction);
@@ -259,7 +222,7 @@ class PredictRun {
       ConvertedView converted = Convert(chunk, pass, view);
       const auto known = std::find_if(
           last_views_.begin(), last_views_.end(), [&](const ViewPrediction& prediction) {
-            return prediction.view.name == image_names_[static_cast<size_t>(view)];
+            return prediction.view.name == photos_.name(view);
           });
       if (!converted.fault.empty() || known == last_views_.end()) continue;
       in_chunk.push_back(std::move(converted.prediction));
@@ -268,8 +231,7 @@ class PredictRun {
     std::optional<AlignedChunk> aligned;
     if (!in_chunk.empty()) aligned = AlignChunk(in_chunk, in_world);
     if (!aligned) {
-      throw Error("the views " + image_names_[static_cast<size_t>(chunk.begin)] + " to " +
-                  image_names_[static_cast<size_t>(chunk.end - 1)] +
+      throw Error("the views " + photos_.name(chunk.begin) + " to " + photos_.name(chunk.end - 1) +
                   " cannot be aligned with those before: none of the " +
                   std::to_string(chunk.num_shared_views) +
                   " shared views is usable; raise --overlap or --max_views");
@@ -287,13 +249,10 @@ class PredictRun {
 
   const ReadyNetwork& network_;
   const PredictOptions& options_;
-  const fs::path& image_folder_;
-  const std::vector<std::string>& image_names_;
   const std::function<void(const ViewPrediction&)>& on_prediction_;
   const ProgressCallback& progress_;
-  PreprocessOptions loader_;
+  PhotoLoader photos_;
   WorkUnits work_;
-  std::vector<PhotoPlacement> placements_;
   std::vector<ViewPrediction> last_views_;  // in the world, for the next chunk
   PredictSummary summary_;
   int64_t done_ = 0;
@@ -301,6 +260,31 @@ class PredictRun {
 };
 
 }  // namespace
+
+PreprocessOptions LoaderOf(const NetworkDescription& description, const PredictOptions& options) {
+  PreprocessOptions loader;
+  const bool is_vggt = std::holds_alternative<VggtConfig>(description.config);
+  loader.policy = is_vggt ? ResizePolicy::kCrop : ResizePolicy::kStretch;
+  loader.side_px = options.side_px;
+  loader.max_pixels = options.max_pixels;
+  return loader;
+}
+
+int MaxViewsAtOnce(const ReadyNetwork& network, double max_memory_gib, const PhotoLoader& photos) {
+  const int width = photos.network_width();
+  const int height = photos.network_height();
+  const MemoryEstimate need = EstimateMemory(network.description, width, height);
+  const int64_t memory = MemoryForPass(network, max_memory_gib);
+  const int64_t fitting = (memory - need.fixed) / need.per_view;
+  if (fitting < std::min(2, photos.num_views())) {
+    const auto missing = static_cast<double>(need.fixed + 2 * need.per_view - memory);
+    throw Error("memory: two views of " + std::to_string(width) + "x" + std::to_string(height) +
+                " pixels do not fit, " +
+                std::to_string(static_cast<int64_t>(missing / kGib * 1024.0) + 1) +
+                " MiB more are needed; raise --max_memory or use smaller images (--side_px)");
+  }
+  return static_cast<int>(std::min<int64_t>(fitting, photos.num_views()));
+}
 
 int64_t MostConnectedView(const at::Tensor& descriptions) {
   const at::Tensor values = descriptions.to(at::kCPU, at::kDouble);
@@ -316,8 +300,7 @@ PredictSummary PredictViews(const ReadyNetwork& network,
                             const ProgressCallback& progress) {
   options.Check();
   VGTW_CHECK(!image_names.empty(), "no photos");
-  // LibTorch starts with one thread where the environment says so or a CPU quota misleads it.
-  at::set_num_threads(ResolveThreads(options.num_threads));
+  UseThreads(options.num_threads);
   const c10::InferenceMode inference;
   return PredictRun(network, options, image_folder, image_names, on_prediction, progress).Run();
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "network/model.h"
+#include "network/photo_loader.h"
 #include "network/predict.h"
 
 #include <cstdint>
@@ -25,6 +26,13 @@ struct ReadyNetwork {
   // Called after every layer.
   std::function<void()> release_memory = {};
 };
+
+// The official loader of a network.
+PreprocessOptions LoaderOf(const NetworkDescription& description, const PredictOptions& options);
+
+// How many of these photos fit into memory in one pass; 0 = what is free. Throws Error if two do
+// not.
+int MaxViewsAtOnce(const ReadyNetwork& network, double max_memory_gib, const PhotoLoader& photos);
 
 // See Predictor::Run.
 PredictSummary PredictViews(const ReadyNetwork& network,

@@ -163,4 +163,26 @@ RgbImage MakeNetworkImage(const RgbImage& photo,
   return DrawResized(photo, placement, resize);
 }
 
+StaticMask MakeNetworkMask(const StaticMask& photo_mask,
+                           const PhotoPlacement& placement,
+                           uint8_t outside) {
+  const NetworkGeometry& geometry = placement.geometry;
+  VGTW_CHECK(photo_mask.width() == static_cast<int>(placement.photo_size.width) &&
+                 photo_mask.height() == static_cast<int>(placement.photo_size.height),
+             "mask is not of its photo's size");
+  StaticMask mask(geometry.network_width, geometry.network_height, outside);
+  for (int y = placement.first_row; y < placement.end_row; ++y) {
+    for (int x = placement.first_column; x < placement.end_column; ++x) {
+      // Where a centre falls on an edge between two pixels, rounding must not choose.
+      constexpr double kTowardsNext = 1e-9;
+      const Eigen::Vector2d pixel =
+          Apply(geometry.original_from_network, Eigen::Vector2d(x + 0.5, y + 0.5));
+      mask(x, y) =
+          photo_mask(std::min(static_cast<int>(pixel.x() + kTowardsNext), photo_mask.width() - 1),
+                     std::min(static_cast<int>(pixel.y() + kTowardsNext), photo_mask.height() - 1));
+    }
+  }
+  return mask;
+}
+
 }  // namespace vgtw

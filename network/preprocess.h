@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "scene/distractor_mask.h"
 #include "scene/image_io.h"
 #include "scene/view.h"
 
@@ -53,5 +54,12 @@ RgbImage MakeNetworkImage(const RgbImage& photo,
                           const PhotoPlacement& placement,
                           const PreprocessOptions& options,
                           int num_threads = 1);
+
+// A photo's mask as the network's image shows it: the mask's value under the centre of each pixel,
+// which is the official loader's nearest neighbour, and `outside` on bars. Throws
+// std::invalid_argument if the mask has not the size of the photo that was placed.
+StaticMask MakeNetworkMask(const StaticMask& photo_mask,
+                           const PhotoPlacement& placement,
+                           uint8_t outside);
 
 }  // namespace vgtw

@@ -7,6 +7,7 @@
 #include "network/model.h"
 
 #include <cstdint>
+#include <vector>
 
 #include <ATen/core/Tensor.h>
 
@@ -17,7 +18,6 @@ struct PatchQuery {
   int64_t view = 0;
   int64_t row = 0;
   int64_t column = 0;
-  int64_t layer = 0;  // pair of a frame block and a global block
 };
 
 // Both [S, rows, columns] over the patches of all views.
@@ -27,10 +27,13 @@ struct PatchProbe {
   double special_attention = 0.0;  // that goes to camera and register tokens
 };
 
-// images [S, 3, H, W] in [0, 1]; `excluded_patches` as in EncodeOptions.
-PatchProbe ProbePatch(const Model& model,
-                      const at::Tensor& images,
-                      const PatchQuery& query,
-                      const at::Tensor& excluded_patches = {});
+// One probe for each of `layers`, pairs of a frame block and a global block counted from 0.
+// images [S, 3, H, W] in [0, 1]; `encode` as for Model::Encode. Throws std::invalid_argument if the
+// query or a layer does not exist.
+std::vector<PatchProbe> ProbePatch(const Model& model,
+                                   const at::Tensor& images,
+                                   const PatchQuery& query,
+                                   const std::vector<int64_t>& layers,
+                                   const EncodeOptions& encode = {});
 
 }  // namespace vgtw

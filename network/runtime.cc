@@ -2,6 +2,7 @@
 #include "network/runtime.h"
 
 #include "scene/error.h"
+#include "scene/parallel.h"
 
 #include <algorithm>
 #include <chrono>
@@ -74,6 +75,8 @@ NetworkRuntime DescribeNetworkRuntime() {
   runtime.gpus = ListGpus();
   return runtime;
 }
+
+void UseThreads(int num_threads) { at::set_num_threads(ResolveThreads(num_threads)); }
 
 double MeasureMatrixProductGflops(int size) {
   VGTW_CHECK(size >= 1, "size = " + std::to_string(size));

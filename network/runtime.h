@@ -23,6 +23,10 @@ struct NetworkRuntime {
 
 NetworkRuntime DescribeNetworkRuntime();
 
+// How many threads an operation uses from now on; 0 = all cores. LibTorch starts with one for two
+// hyperthreads, or where the environment or a quota says so.
+void UseThreads(int num_threads);
+
 // Speed of a float32 product of two size x size matrices, in 1e9 operations per second: the best of
 // three after one that is not counted, with the threads that LibTorch uses now. size >= 1.
 double MeasureMatrixProductGflops(int size = 768);

@@ -66,7 +66,10 @@ CameraOutputs Vggt::PredictCameras(const Features& features) const {
   return {at::stack(steps), cameras.cam_from_world, cameras.intrinsics};
 }
 
-DenseOutputs Vggt::PredictMaps(const Features& features, int64_t begin, int64_t end) const {
+DenseOutputs Vggt::PredictMaps(const Features& features,
+                               int64_t begin,
+                               int64_t end,
+                               const MapChoice& choice) const {
   const std::array<at::Tensor, 4> layers = SliceViews(features, begin, end);
   const auto run = [&](const DptHead& head) {
     return head(layers, features.height, features.width);
@@ -75,20 +78,17 @@ DenseOutputs Vggt::PredictMaps(const Features& features, int64_t begin, int64_t 
   const at::Tensor depth = run(depth_head_);
   outputs.depth = depth.select(1, 0).exp();
   outputs.depth_conf = 1.0 + depth.select(1, 1).exp();
-  const at::Tensor points = run(point_head_);
-  outputs.points = InverseLog(points.slice(1, 0, 3)).permute({0, 2, 3, 1});
-  outputs.points_conf = 1.0 + points.select(1, 3).exp();
+  if (choice.points) {
+    const at::Tensor points = run(point_head_);
+    outputs.points = InverseLog(points.slice(1, 0, 3)).permute({0, 2, 3, 1});
+    outputs.points_conf = 1.0 + points.select(1, 3).exp();
+  }
   if (distractor_head_) outputs.distractor_logits = run(*distractor_head_).select(1, 0);
   return outputs;
 }
 
-at::Tensor Vggt::GlobalAttentionOf(int64_t view,
-                                   int64_t token,
-                                   int64_t layer,
-                                   const at::Tensor& tokens,
-                                   int64_t height,
-                                   int64_t width) const {
-  return aggregator_.GlobalAttentionOf(view, token, layer, tokens, height, width);
+const TransformerBlock& Vggt::GlobalBlock(int64_t layer) const {
+  return aggregator_.global_block(layer);
 }
 
 }  // namespace vgtw

@@ -23,14 +23,12 @@ class Vggt : public Model {
 
   Features Encode(const at::Tensor& images, const EncodeOptions& options) const override;
   CameraOutputs PredictCameras(const Features& features) const override;
-  DenseOutputs PredictMaps(const Features& features, int64_t begin, int64_t end) const override;
+  DenseOutputs PredictMaps(const Features& features,
+                           int64_t begin,
+                           int64_t end,
+                           const MapChoice& choice) const override;
 
-  at::Tensor GlobalAttentionOf(int64_t view,
-                               int64_t token,
-                               int64_t layer,
-                               const at::Tensor& tokens,
-                               int64_t height,
-                               int64_t width) const override;
+  const TransformerBlock& GlobalBlock(int64_t layer) const override;
 
   const Aggregator& aggregator() const { return aggregator_; }
 

@@ -30,6 +30,11 @@ ChannelStatistics ImageNetStatistics(const at::Device& device) {
   return {per_channel({0.485f, 0.456f, 0.406f}), per_channel({0.229f, 0.224f, 0.225f})};
 }
 
+at::Tensor NormaliseImages(const at::Tensor& images) {
+  const ChannelStatistics statistics = ImageNetStatistics(images.device());
+  return (images - statistics.mean) / statistics.deviation;
+}
+
 at::Tensor ResizePositions(const at::Tensor& positions, int64_t num_rows, int64_t num_columns) {
   const int64_t grid_size = std::lround(std::sqrt(static_cast<double>(positions.size(1) - 1)));
   if (num_rows == grid_size && num_columns == grid_size) return positions;

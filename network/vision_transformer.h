@@ -18,6 +18,8 @@ struct ChannelStatistics {
   at::Tensor deviation;
 };
 ChannelStatistics ImageNetStatistics(const at::Device& device);
+// images [S, 3, H, W] in [0, 1] by these.
+at::Tensor NormaliseImages(const at::Tensor& images);
 
 // Position embeddings [1, 1 + P, E] for num_rows x num_columns patches from those of a square grid
 // [1, 1 + grid^2, E], of which the first is the class token's: bicubic and antialiased, in float32.

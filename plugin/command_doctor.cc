@@ -7,9 +7,9 @@
 #include "plugin/table.h"
 #include "plugin/version.h"
 #include "scene/error.h"
+#include "scene/memory.h"
 
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <thread>
 
@@ -28,17 +28,6 @@ struct Finding {
   std::string found;
   std::string advice = {};  // what to do, if it is not good
 };
-
-double MemoryGib(const char* key) {
-  std::ifstream file("/proc/meminfo");
-  for (std::string name, unit; file >> name;) {
-    double kib = 0.0;
-    if (!(file >> kib)) break;
-    std::getline(file, unit);
-    if (name == std::string(key) + ":") return kib / (1024.0 * 1024.0);
-  }
-  return 0.0;
-}
 
 // What the installed colmap makes of an empty database.
 std::string DescribeNewDatabase(const Colmap& colmap) {
@@ -109,20 +98,22 @@ struct DoctorCommand {
 
   void Run() const {
     Apply(usability);
+    const double total_gib = static_cast<double>(TotalMemory()) / kGib;
+    const double available_gib = static_cast<double>(AvailableMemory()) / kGib;
     json result = {{"vgtw", kVersion},
                    {"num_cores", std::thread::hardware_concurrency()},
-                   {"memory_gib", MemoryGib("MemTotal")},
-                   {"memory_available_gib", MemoryGib("MemAvailable")}};
+                   {"memory_gib", total_gib},
+                   {"memory_available_gib", available_gib}};
     std::vector<Finding> findings = {CheckColmap(colmap, result), CheckNetwork(result)};
     findings.push_back({"machine",
                         true,
                         std::to_string(std::thread::hardware_concurrency()) + " cores, " +
-                            FormatNumber(MemoryGib("MemAvailable"), 1) + " of " +
-                            FormatNumber(MemoryGib("MemTotal"), 1) + " GiB memory free"});
+                            FormatNumber(available_gib, 1) + " of " + FormatNumber(total_gib, 1) +
+                            " GiB memory free"});
     const bool has_colmap = result.contains("colmap");
     std::string text = Format(findings);
-    text += "\nWorks here: import, mask make, mask apply, seed";
-    if (result.contains("libtorch")) text += ", predict, weights";
+    text += "\nWorks here: import, mask, seed";
+    if (result.contains("libtorch")) text += ", predict, probe, weights";
     text += has_colmap ? ", run, demo\n" : "\nNeeds colmap: run, demo\n";
     text += has_colmap ? "Next: vgtw demo --output_path demo/\n" : "Next: apt-get install colmap\n";
     Finish(usability, text, result);

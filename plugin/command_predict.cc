@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/predictions.h"
-#include "network/predict.h"
 #include "plugin/commands.h"
-#include "plugin/hashing.h"
 #include "plugin/network_commands.h"
+#include "plugin/network_flags.h"
 #include "plugin/progress.h"
 #include "plugin/subprocess.h"
 #include "plugin/table.h"
@@ -12,7 +11,6 @@
 #include "scene/statistics.h"
 
 #include <cmath>
-#include <map>
 #include <memory>
 #include <numbers>
 
@@ -21,9 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-const std::map<std::string, Precision> kPrecisions = {
-    {"fp32", Precision::kFloat32}, {"bf16", Precision::kBfloat16}, {"fp16", Precision::kFloat16}};
 
 // One line of the table.
 struct ViewRow {
@@ -60,30 +55,23 @@ ViewRow Describe(const ViewPrediction& prediction) {
 }
 
 struct PredictCommand {
-  fs::path image_path;
-  fs::path weights_path;
-  fs::path lora_path;
+  NetworkFlags network_flags;
   fs::path output_path;
-  std::string model = "auto";
-  std::string precision = "fp32";
   std::string reference = "first";
   bool overwrite = false;
-  PredictOptions options;
   Usability usability;
 
   void Run() {
     Apply(usability);
     // Fail before the work, not after it.
     AtomicFolder{output_path, overwrite};
-    const std::vector<std::string> names = ListImages(image_path);
-    options.kind = FindNetworkKind(model);
-    options.precision = kPrecisions.at(precision);
+    const std::vector<std::string> names = ListImages(network_flags.image_path);
+    PredictOptions options = network_flags.Options(names, usability);
     if (reference == "most-connected") options.reference = ReferenceChoice::kMostConnected;
-    options.num_threads = usability.num_threads;
     Announce("reading the weights");
-    const Predictor predictor(WeightsFiles(), options);
+    const Predictor predictor(network_flags.weights.Files(), options);
     const std::string network(NetworkKindName(predictor.kind()));
-    PredictionWriter writer(output_path, network, WeightsHash(), overwrite);
+    PredictionWriter writer(output_path, network, network_flags.weights.Hash(), overwrite);
     std::vector<ViewRow> rows;
     PredictSummary summary;
     {
@@ -92,7 +80,7 @@ struct PredictCommand {
         writer.Add(prediction);
         rows.push_back(Describe(prediction));
       };
-      summary = predictor.Run(image_path, names, add, display.Callback());
+      summary = predictor.Run(network_flags.image_path, names, add, display.Callback());
     }
     if (rows.empty()) {
       throw Error("no view is usable (" + Printable(summary.rejected_views.front()) +
@@ -100,17 +88,6 @@ struct PredictCommand {
     }
     writer.Commit();
     Finish(usability, Text(network, summary, rows), Json(network, summary, rows));
-  }
-
-  std::vector<fs::path> WeightsFiles() const {
-    if (lora_path.empty()) return {weights_path};
-    return {weights_path, lora_path};
-  }
-
-  std::string WeightsHash() const {
-    std::string hashes;
-    for (const fs::path& path : WeightsFiles()) hashes += HashFile(path);
-    return lora_path.empty() ? hashes : HashText(hashes);
   }
 
   std::string Text(const std::string& network,
@@ -140,7 +117,7 @@ struct PredictCommand {
            ShellLine("vgtw",
                      {"run",
                       "--image_path",
-                      image_path.string(),
+                      network_flags.image_path.string(),
                       "--predictions_path",
                       output_path.string(),
                       "--output_path",
@@ -208,24 +185,11 @@ struct PredictCommand {
 
 std::function<void()> DeclarePredict(Flags& flags) {
   const auto command = std::make_shared<PredictCommand>();
-  PredictOptions& options = command->options;
-  flags.Group("Input")
-      .Require("image_path", &command->image_path, "The photos")
-      .Require("weights_path",
-               &command->weights_path,
-               "Weights: .safetensors, its .index.json, or a file of torch.save")
-      .Add("lora_path",
-           &command->lora_path,
-           "Weights that replace or extend those: LoRA and distractor head")
-      .AddChoice("model",
-                 &command->model,
-                 {"auto", "vgtw", "vggt", "pi3", "vgtw-pi3"},
-                 "The network that the weights must be of; auto = told by their names");
+  NetworkFlags& network_flags = command->network_flags;
+  PredictOptions& options = network_flags.options();
+  network_flags.DeclareInput(flags);
+  network_flags.DeclareImageSize(flags);
   flags.Group("Algorithm")
-      .Add("side_px",
-           &options.side_px,
-           "Width of the network's image, pixels, a multiple of 14 (not pi3)")
-      .Add("max_pixels", &options.max_pixels, "Pixels of the network's image (pi3)")
       .AddChoice("reference",
                  &command->reference,
                  {"first", "most-connected"},
@@ -238,15 +202,7 @@ std::function<void()> DeclarePredict(Flags& flags) {
            &options.num_overlap_views,
            "Views that chunks share, at most half of --max_views")
       .Add("points", &options.with_points, "Also write the points of the network's point head");
-  flags.Group("Machine")
-      .Add("device", &options.device, "cpu, cuda or cuda:<number>")
-      .AddChoice("precision",
-                 &command->precision,
-                 {"fp32", "bf16", "fp16"},
-                 "Numbers of matrix products; fp16 on GPUs only")
-      .Add("max_memory",
-           &options.max_memory_gib,
-           "Memory to use, of the process or of the GPU, GiB; 0 = what is free");
+  network_flags.DeclareMachine(flags);
   flags.Group("Output")
       .Require("output_path", &command->output_path, "Predictions folder to write")
       .Add("overwrite", &command->overwrite, "Replace an existing folder");

@@ -3,9 +3,11 @@
 #include "network/weights_audit.h"
 #include "plugin/commands.h"
 #include "plugin/network_commands.h"
+#include "plugin/network_flags.h"
 #include "plugin/progress.h"
 #include "plugin/table.h"
 #include "scene/error.h"
+#include "scene/memory.h"
 
 #include <algorithm>
 #include <chrono>
@@ -13,46 +15,16 @@
 #include <memory>
 #include <optional>
 #include <set>
-#include <sys/resource.h>
 
 namespace vgtw {
 namespace {
 
 using nlohmann::json;
 
-constexpr double kGib = 1024.0 * 1024.0 * 1024.0;
-
-// The flags that say which weights.
-struct WeightsInput {
-  std::filesystem::path weights_path;
-  std::filesystem::path lora_path;
-
-  void Declare(Flags& flags) {
-    flags.Group("Input")
-        .Require("weights_path",
-                 &weights_path,
-                 "Weights: .safetensors, its .index.json, or a file of torch.save")
-        .Add("lora_path",
-             &lora_path,
-             "Weights that replace or extend those: LoRA and distractor head");
-  }
-
-  std::vector<std::filesystem::path> Files() const {
-    if (lora_path.empty()) return {weights_path};
-    return {weights_path, lora_path};
-  }
-};
-
 std::string GroupThousands(uint64_t number) {
   std::string text = std::to_string(number);
   for (size_t i = text.size(); i > 3; i -= 3) text.insert(i - 3, ",");
   return text;
-}
-
-double PeakMemoryGib() {
-  rusage usage = {};
-  ::getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) * 1024.0 / kGib;
 }
 
 // "a.blocks.3.attn.weight" -> "a.blocks.3.attn" and "weight"; then numbers become "*".
@@ -146,7 +118,7 @@ json ToJson(const Pi3Config& config) {
 }
 
 struct InspectCommand {
-  WeightsInput input;
+  WeightsFlags input;
   bool lists_all = false;
   Usability usability;
 
@@ -251,7 +223,7 @@ struct InspectCommand {
 };
 
 struct CheckCommand {
-  WeightsInput input;
+  WeightsFlags input;
   Usability usability;
 
   void Run() const {
@@ -260,12 +232,13 @@ struct CheckCommand {
     const NetworkDescription description = Try();
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     const std::string kind(NetworkKindName(description.kind));
+    const double peak_gib = static_cast<double>(PeakMemory()) / kGib;
     Finish(
         usability,
         "OK: all weights of " + kind + ", all finite, loaded in " +
-            FormatNumber(seconds.count(), 1) + " s with " + FormatNumber(PeakMemoryGib(), 2) +
+            FormatNumber(seconds.count(), 1) + " s with " + FormatNumber(peak_gib, 2) +
             " GiB of memory\n",
-        {{"network", kind}, {"load_sec", seconds.count()}, {"peak_memory_gib", PeakMemoryGib()}});
+        {{"network", kind}, {"load_sec", seconds.count()}, {"peak_memory_gib", peak_gib}});
   }
 
  private:
@@ -276,7 +249,7 @@ struct CheckCommand {
 };
 
 struct ConvertCommand {
-  WeightsInput input;
+  WeightsFlags input;
   std::filesystem::path output_path;
   std::string type = "f32";
   bool overwrite = false;

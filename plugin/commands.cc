@@ -52,6 +52,7 @@ const std::vector<Command>& Commands() {
        "Photos and predictions -> masks, database, refined COLMAP model, report",
        DeclareRun,
        "  vgtw run --image_path photos/ --predictions_path predictions/ --output_path out/"},
+      {"probe", kProbeSummary, {}, {}, BecomeNetworkProgram},
       {"weights", kWeightsSummary},
       {"weights inspect", kWeightsInspectSummary, {}, {}, BecomeNetworkProgram},
       {"weights check", kWeightsCheckSummary, {}, {}, BecomeNetworkProgram},

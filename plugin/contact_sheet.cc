@@ -1,22 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/contact_sheet.h"
 
+#include "plugin/tile_sheet.h"
 #include "scene/drawing.h"
 #include "scene/error.h"
-
-#include <algorithm>
-#include <cmath>
 
 namespace vgtw {
 namespace {
 
-constexpr Rgb kBackground = {255, 255, 255};
-constexpr Rgb kInk = {40, 40, 40};
 constexpr Rgb kKept = {30, 200, 60};
 constexpr Rgb kDropped = {230, 30, 40};
-constexpr int kMarginPx = 8;
-constexpr int kCaptionPx = 24;
-constexpr double kTextPx = 10.0;
 
 RgbImage TintExcluded(const RgbImage& photo, const StaticMask& static_mask) {
   RgbImage tinted = photo;
@@ -50,41 +43,24 @@ void DrawFeatures(const std::vector<Eigen::Vector2d>& features,
 }  // namespace
 
 RgbImage MakeContactSheet(const std::vector<ContactSheetRow>& rows, int tile_width) {
-  std::vector<int> heights;
-  int total_height = kMarginPx;
+  std::vector<std::vector<Tile>> tiles;
   for (const ContactSheetRow& row : rows) {
     VGTW_CHECK(row.static_mask.width() == row.photo.width() &&
                    row.static_mask.height() == row.photo.height(),
                "mask has the photo's size");
-    const double aspect = double(row.photo.height()) / double(row.photo.width());
-    heights.push_back(std::max(1, static_cast<int>(std::lround(tile_width * aspect))));
-    total_height += kCaptionPx + heights.back() + kMarginPx;
-  }
-  RgbImage sheet(3 * tile_width + 4 * kMarginPx, total_height, kBackground);
-  int y = kMarginPx;
-  for (size_t i = 0; i < rows.size(); ++i) {
-    const ContactSheetRow& row = rows[i];
-    const RgbImage photo = ResizeImage(row.photo, tile_width, heights[i]);
+    const RgbImage photo = ResizeToWidth(row.photo, tile_width);
     RgbImage features = Faded(photo);
     const double scale = double(tile_width) / double(row.photo.width());
     DrawFeatures(row.kept_features, scale, kKept, features);
     DrawFeatures(row.dropped_features, scale, kDropped, features);
-    const std::vector<std::pair<std::string, RgbImage>> tiles = {
-        {row.name, photo},
-        {"excluded by the mask",
-         ResizeImage(TintExcluded(row.photo, row.static_mask), tile_width, heights[i])},
-        {std::to_string(row.kept_features.size()) + " features kept, " +
-             std::to_string(row.dropped_features.size()) + " dropped",
-         features}};
-    int x = kMarginPx;
-    for (const auto& [caption, tile] : tiles) {
-      DrawText(caption, x, y + kCaptionPx - 8, kTextPx, kInk, sheet);
-      Paste(tile, x, y + kCaptionPx, sheet);
-      x += tile_width + kMarginPx;
-    }
-    y += kCaptionPx + heights[i] + kMarginPx;
+    tiles.push_back({{row.name, photo},
+                     {"excluded by the mask",
+                      ResizeToWidth(TintExcluded(row.photo, row.static_mask), tile_width)},
+                     {std::to_string(row.kept_features.size()) + " features kept, " +
+                          std::to_string(row.dropped_features.size()) + " dropped",
+                      features}});
   }
-  return sheet;
+  return MakeTileSheet(tiles);
 }
 
 }  // namespace vgtw

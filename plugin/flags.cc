@@ -208,6 +208,14 @@ Flags& Flags::Add(std::string_view name, int* value, std::string_view help) {
   return *this;
 }
 
+Flags& Flags::Add(std::string_view name, std::vector<int64_t>* value, std::string_view help) {
+  impl_->app->add_option("--" + std::string(name), *value, std::string(help))
+      ->group(impl_->group)
+      ->delimiter(',')
+      ->take_all();
+  return *this;
+}
+
 Flags& Flags::Add(std::string_view name, uint64_t* value, std::string_view help) {
   AddOption(*impl_, name, value, help);
   return *this;

@@ -44,6 +44,7 @@ nlohmann::json ToJson(const NetworkRuntime& runtime, double gflops) {
 
 std::function<void()> DeclareRuntime(Flags&) {
   return [] {
+    UseThreads(0);  // as `predict` does
     const double gflops = MeasureMatrixProductGflops();
     std::puts(ToJson(DescribeNetworkRuntime(), gflops).dump(2).c_str());
   };
@@ -59,6 +60,11 @@ std::vector<Command> NetworkCommands() {
        "predictions/\n"
        "  vgtw predict --image_path photos/ --weights_path vggt.safetensors --lora_path lora.pt "
        "--output_path predictions/"},
+      {"probe",
+       kProbeSummary,
+       DeclareProbe,
+       "  vgtw probe --image_path photos/ --weights_path vgtw.safetensors --mask_path masks/ "
+       "--query_image a.jpg --query_x 640 --query_y 360 --output_path probe/"},
       {"weights", kWeightsSummary},
       {"weights inspect",
        kWeightsInspectSummary,

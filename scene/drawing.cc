@@ -34,6 +34,11 @@ RgbImage ResizeImage(const RgbImage& image, int width, int height) {
   return resized;
 }
 
+RgbImage ResizeToWidth(const RgbImage& image, int width) {
+  const double aspect = double(image.height()) / double(image.width());
+  return ResizeImage(image, width, std::max(1, cvRound(width * aspect)));
+}
+
 void DrawDisc(const Eigen::Vector2d& centre, double radius_px, const Rgb& color, RgbImage& image) {
   // Fixed point with 4 fractional bits; OpenCV's pixel centres are at integers.
   constexpr int kShift = 4;

@@ -14,6 +14,9 @@ namespace vgtw {
 // Resampled by area (smaller) or bilinearly (larger); sizes > 0.
 RgbImage ResizeImage(const RgbImage& image, int width, int height);
 
+// To a width, with the image's aspect; at least one row.
+RgbImage ResizeToWidth(const RgbImage& image, int width);
+
 // A filled, anti-aliased disc; parts outside of the image are left out.
 void DrawDisc(const Eigen::Vector2d& centre, double radius_px, const Rgb& color, RgbImage& image);
 

@@ -2,6 +2,7 @@
 #include "scene/safetensors.h"
 
 #include "scene/error.h"
+#include "scene/float16.h"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +12,6 @@
 #include <optional>
 #include <utility>
 
-#include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
 namespace vgtw {
@@ -240,7 +240,7 @@ void StreamSafetensors(const std::filesystem::path& path,
     uint64_t num_bytes = 0;
     source(name, [&](std::span<const std::byte> bytes) {
       num_bytes += bytes.size();
-      if (!bytes.empty()) file.Write(bytes);  // an empty span may be null, which fwrite forbids
+      file.Write(bytes);
     });
     VGTW_CHECK(num_bytes == NumBytes(layout.shape, SizeInBytes(layout.type)),
                "bytes of tensor " + name + " do not fit its shape");
@@ -279,14 +279,9 @@ std::vector<float> ToFloats(const StoredTensor& tensor) {
     case TensorType::kF32:
       return load([](float value) { return value; }, float{});
     case TensorType::kF16:
-      return load(
-          [](uint16_t bits) {
-            return static_cast<float>(Eigen::numext::bit_cast<Eigen::half>(bits));
-          },
-          uint16_t{});
+      return load(FloatOfHalf, uint16_t{});
     case TensorType::kBF16:
-      return load([](uint16_t bits) { return std::bit_cast<float>(uint32_t{bits} << 16); },
-                  uint16_t{});
+      return load(FloatOfBrain, uint16_t{});
     default:
       throw std::invalid_argument("tensor of type " + std::string(TensorTypeName(tensor.type)) +
                                   " has no floating-point values");

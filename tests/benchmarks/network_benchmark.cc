@@ -5,12 +5,12 @@
 // compare_networks runs it beside Python.
 #include "network/weights.h"
 #include "scene/error.h"
+#include "scene/memory.h"
 
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <string_view>
-#include <sys/resource.h>
 #include <thread>
 
 #include <ATen/ATen.h>
@@ -50,11 +50,9 @@ int Run(int argc, char** argv) {
   Finish(network.model->PredictCameras(features).cam_from_world);
   const double cameras = Seconds();
   for (int64_t i = 0; i < num_views; ++i) {
-    Finish(network.model->PredictMaps(features, i, i + 1).depth);
+    Finish(network.model->PredictMaps(features, i, i + 1, {}).depth);
   }
   const double heads = Seconds();
-  rusage usage = {};
-  ::getrusage(RUSAGE_SELF, &usage);
   std::printf(
       "{\"load_sec\": %.2f, \"encode_sec\": %.2f, \"cameras_sec\": %.2f, \"heads_sec\": %.2f, "
       "\"forward_sec\": %.2f, \"peak_gib\": %.2f}\n",
@@ -63,7 +61,7 @@ int Run(int argc, char** argv) {
       cameras - encoded,
       heads - cameras,
       heads - loaded,
-      static_cast<double>(usage.ru_maxrss) / (1 << 20));
+      static_cast<double>(PeakMemory()) / kGib);
   return 0;
 }
 

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "network/identify.h"
 
+#include "tests/parity/parity_formula.h"
 #include "tests/support/bytes.h"
 #include "tests/support/shared_data.h"
-
-#include <fstream>
-#include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,20 +23,10 @@ std::string ErrorFor(const TensorShapes& shapes, const Metadata& metadata = {}) 
   return ErrorOf([&] { Identify(shapes, metadata); });
 }
 
-// "name 3x4" per line, "-" for a scalar; lines of comments begin with '#'.
 TensorShapes ReadShapes(const std::filesystem::path& path) {
   TensorShapes shapes;
-  std::ifstream file(path);
-  for (std::string line; std::getline(file, line);) {
-    if (line.empty() || line.front() == '#') continue;
-    std::istringstream fields(line);
-    std::string name;
-    std::string sizes;
-    fields >> name >> sizes;
-    std::istringstream numbers(sizes == "-" ? "" : sizes);
-    for (std::string number; std::getline(numbers, number, 'x');) {
-      shapes[name].push_back(std::stoull(number));
-    }
+  for (const auto& [name, shape] : ReadParityShapes(path)) {
+    shapes[name] = {shape.begin(), shape.end()};
   }
   return shapes;
 }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <ostream>
 #include <stdexcept>
 
@@ -82,6 +83,26 @@ INSTANTIATE_TEST_SUITE_P(
                     LoaderCase{"square252", 0, "photo.port", 133, 200, kSquare},
                     LoaderCase{"square252", 1, "photo.big", 700, 500, kSquare},
                     LoaderCase{"pi3.big", 0, "photo.big", 700, 500, kStretch}));
+
+TEST(NetworkMask, IsThatOfTheOfficialLoader) {
+  VGTW_NEED_PARITY_DATA();
+  StaticMask photo_mask(200, 133, 255);
+  const RgbImage photo = ParityPhoto("photo.mask", 200, 133);
+  for (size_t i = 0; i < photo.size(); ++i) {
+    photo_mask.data()[i] = photo.data()[i][0] > 127 ? 255 : 0;
+  }
+  const StaticMask mask =
+      MakeNetworkMask(photo_mask, PlacePhotos({{200, 133}}, kCrop).front(), /*outside=*/0);
+  const SafetensorsFile file(ParityData() / "preprocess.safetensors");
+  const StoredTensor& official = file.tensors().at("mask.land");
+  ASSERT_EQ(official.bytes.size(), mask.size());
+  EXPECT_EQ(std::memcmp(official.bytes.data(), mask.data().data(), mask.size()), 0);
+}
+
+TEST(NetworkMask, RefusesAMaskOfAnotherSize) {
+  const auto placements = PlacePhotos({{200, 133}}, kCrop);
+  EXPECT_THROW(MakeNetworkMask(StaticMask(100, 133, 0), placements[0], 0), std::invalid_argument);
+}
 
 // The corners that VGGT's loader reports beside its squares, in float32.
 TEST(PlacePhotos, GivesTheCornersOfTheOfficialSquares) {

@@ -44,7 +44,7 @@ class Probe : public testing::TestWithParam<bool> {
 };
 
 TEST_P(Probe, AttentionIsAllSpentAndThePatchIsMostLikeItself) {
-  const PatchProbe probe = ProbePatch(*model_, images_, {1, 2, 3, 2});
+  const PatchProbe probe = ProbePatch(*model_, images_, {1, 2, 3}, {2}).front();
   EXPECT_NEAR(probe.attention.sum().item<double>() + probe.special_attention, 1.0, 1e-6);
   EXPECT_NEAR(probe.similarity[1][2][3].item<double>(), 1.0, 1e-6);
   EXPECT_LE(probe.similarity.max().item<double>(), 1.0 + 1e-6);
@@ -58,17 +58,29 @@ TEST_P(Probe, ExcludedPatchesLeaveNoTraceInOtherViews) {
   at::Tensor changed = images_.clone();
   changed[0].fill_(0.25);
   const auto probe = [&](const at::Tensor& images, const at::Tensor& excluded) {
-    return ProbePatch(*model_, images, {1, 2, 3, 2}, excluded);
+    return ProbePatch(*model_, images, {1, 2, 3}, {2}, {.excluded_patches = excluded}).front();
   };
   EXPECT_TRUE(at::equal(probe(images_, first_view).similarity[1],
                         probe(changed, first_view).similarity[1]));
   EXPECT_FALSE(at::equal(probe(images_, {}).similarity[1], probe(changed, {}).similarity[1]));
 }
 
+TEST_P(Probe, ExcludedPatchesGetNoAttentionAndTheOthersAllOfIt) {
+  at::Tensor excluded = at::zeros({2, 24}, at::kBool);
+  excluded[0].slice(0, 3, 9).fill_(true);
+  const auto probes =
+      ProbePatch(*model_, images_, {1, 2, 3}, {0, 2}, {.excluded_patches = excluded});
+  for (const PatchProbe& probe : probes) {
+    EXPECT_EQ(probe.attention[0].view({-1}).slice(0, 3, 9).abs().sum().item<double>(), 0.0);
+    EXPECT_NEAR(probe.attention.sum().item<double>() + probe.special_attention, 1.0, 1e-6);
+  }
+  EXPECT_FALSE(at::equal(probes[0].attention, probes[1].attention));
+}
+
 TEST_P(Probe, RefusesWhatIsOutside) {
-  EXPECT_THROW(ProbePatch(*model_, images_, {2, 0, 0, 0}), std::invalid_argument);
-  EXPECT_THROW(ProbePatch(*model_, images_, {0, 4, 0, 0}), std::invalid_argument);
-  EXPECT_THROW(ProbePatch(*model_, images_, {0, 0, 0, 3}), std::invalid_argument);
+  EXPECT_THROW(ProbePatch(*model_, images_, {2, 0, 0}, {0}), std::invalid_argument);
+  EXPECT_THROW(ProbePatch(*model_, images_, {0, 4, 0}, {0}), std::invalid_argument);
+  EXPECT_THROW(ProbePatch(*model_, images_, {0, 0, 0}, {3}), std::invalid_argument);
 }
 
 INSTANTIATE_TEST_SUITE_P(Networks, Probe, testing::Bool());

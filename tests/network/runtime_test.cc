@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "network/runtime.h"
 
+#include "tests/support/colmap.h"
+
 #include <filesystem>
 #include <stdexcept>
 
@@ -44,8 +46,19 @@ TEST(NetworkRuntime, ReportsTheThreadsInUse) {
   EXPECT_EQ(DescribeNetworkRuntime().num_threads, num_threads);
   at::set_num_threads(num_threads + 1);
   EXPECT_EQ(DescribeNetworkRuntime().num_threads, num_threads + 1);
-  at::set_num_threads(num_threads);
+  UseThreads(num_threads);
+  EXPECT_EQ(at::get_num_threads(), num_threads);
   EXPECT_EQ(DescribeNetworkRuntime().num_interop_threads, at::get_num_interop_threads());
+}
+
+// Other libraries bring a BLAS of their own, Debian's Ceres ATLAS, whose products are several times
+// slower: the program must be linked so that the one of LibTorch answers, as it does here.
+TEST(NetworkRuntime, TheProgramHasTheSameBlas) {
+  const ColmapRun run = RunColmap({"runtime"}, VGTW_NETWORK_PROGRAM);
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  const std::string expected = DescribeNetworkRuntime().blas_library;
+  EXPECT_THAT(run.output, HasSubstr("\"blas_library\": \"" + expected + "\""));
+  EXPECT_EQ(expected.find("f77blas"), std::string::npos);
 }
 
 TEST(NetworkRuntime, NamesTheLibrariesAtHand) {

@@ -3,6 +3,7 @@
 // random directions of the parameters, against differences, in double precision.
 #include "network/vggt.h"
 
+#include "tests/network/tiny_network.h"
 #include "tests/parity/parity_formula.h"
 
 #include <cmath>
@@ -29,24 +30,17 @@ class LeafSource : public ParameterSource {
   std::map<std::string, at::Tensor> leaves;
 };
 
-VggtConfig TinyVgtw() {
-  VggtConfig config;
-  config.encoder = EncoderConfig{.dim = 16, .depth = 1, .num_heads = 2, .grid_size = 3};
-  config.dim = 16;
-  config.depth = 4;
-  config.num_heads = 2;
+VggtConfig TrainableVgtw() {
+  VggtConfig config = TinyVgtw(16);
   config.num_camera_heads = 2;
-  config.head_layers = {0, 1, 2, 3};
-  config.dpt = {.num_features = 8, .num_channels = {8, 8, 8, 8}};
-  config.lora = LoraConfig{.rank = 2, .alpha = 1.0};
-  config.has_distractor_head = true;
+  config.lora->alpha = 1.0;
   return config;
 }
 
 at::Tensor Loss(const Vggt& network, const at::Tensor& images) {
   const Features features = network.Encode(images, {});
   const CameraOutputs cameras = network.PredictCameras(features);
-  const DenseOutputs maps = network.PredictMaps(features, 0, features.num_views());
+  const DenseOutputs maps = network.PredictMaps(features, 0, features.num_views(), {});
   at::Tensor loss = cameras.pose_encodings[0].square().mean();
   loss = loss + maps.depth.log().square().mean() + maps.depth_conf.log().mean();
   loss = loss + maps.points.square().mean() + maps.points_conf.log().mean();
@@ -55,7 +49,7 @@ at::Tensor Loss(const Vggt& network, const at::Tensor& images) {
 
 TEST(Gradient, MatchesDifferencesAlongEveryKindOfParameter) {
   LeafSource source;
-  const Vggt network(ParameterScope(source), TinyVgtw());
+  const Vggt network(ParameterScope(source), TrainableVgtw());
   const at::Tensor images =
       at::tensor(ParityPixels("images.gradient", 2, 28, 42)).view({2, 3, 28, 42}).to(at::kDouble) /
       255.0;
@@ -92,7 +86,7 @@ TEST(Gradient, MatchesDifferencesAlongEveryKindOfParameter) {
 // Frozen parameters get none, and what feeds back the raw pose is detached.
 TEST(Gradient, StopsWhereTheOfficialNetworkStopsIt) {
   LeafSource source;
-  const Vggt network(ParameterScope(source), TinyVgtw());
+  const Vggt network(ParameterScope(source), TrainableVgtw());
   const at::Tensor images =
       at::tensor(ParityPixels("images.gradient", 1, 28, 28)).view({1, 3, 28, 28}).to(at::kDouble) /
       255.0;

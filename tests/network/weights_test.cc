@@ -4,6 +4,7 @@
 #include "network/checkpoint_convert.h"
 #include "network/weights_audit.h"
 #include "scene/files.h"
+#include "tests/network/tiny_network.h"
 #include "tests/parity/parity_fixture.h"
 #include "tests/parity/parity_formula.h"
 #include "tests/support/bytes.h"
@@ -27,17 +28,10 @@ using testing::HasSubstr;
 const std::map<std::string, std::string> kTinyMetadata = {{kCameraHeadsKey, "2"},
                                                           {kLoraAlphaKey, "1"}};
 
-NetworkDescription TinyVgtw() {
-  VggtConfig config;
-  config.encoder = EncoderConfig{.dim = 16, .depth = 1, .num_heads = 2, .grid_size = 3};
-  config.dim = 16;
-  config.depth = 4;
-  config.num_heads = 2;
+NetworkDescription TinyVgtwNetwork() {
+  VggtConfig config = TinyVgtw(16);
   config.num_camera_heads = 2;
-  config.head_layers = {0, 1, 2, 3};
-  config.dpt = {.num_features = 8, .num_channels = {8, 8, 8, 8}};
-  config.lora = LoraConfig{.rank = 2, .alpha = 1.0};
-  config.has_distractor_head = true;
+  config.lora->alpha = 1.0;
   return {NetworkKind::kVgtw, config};
 }
 
@@ -120,7 +114,7 @@ class LoadNetworkTest : public testing::Test {
   }
 
   TemporaryFolder folder_;
-  const Weights vgtw_ = Weights(TinyVgtw());
+  const Weights vgtw_ = Weights(TinyVgtwNetwork());
 };
 
 // Of two views of 28 x 42 pixels: everything that a network predicts.
@@ -130,7 +124,7 @@ std::vector<at::Tensor> OutputsOf(const Model& model) {
       at::tensor(ParityPixels("images.weights", 2, 28, 42)).view({2, 3, 28, 42}).to(at::kFloat) /
       255.0f;
   const Features features = model.Encode(images, {});
-  const DenseOutputs maps = model.PredictMaps(features, 0, 2);
+  const DenseOutputs maps = model.PredictMaps(features, 0, 2, {});
   std::vector<at::Tensor> outputs = {model.PredictCameras(features).cam_from_world};
   for (const at::Tensor& map : {maps.depth, maps.depth_conf, maps.distractor_logits}) {
     if (map.defined()) outputs.push_back(map);
@@ -154,7 +148,7 @@ TEST_F(LoadNetworkTest, GivesTheNetworkThatWasWritten) {
   const LoadedNetwork vgtw = LoadNetwork({Write("vgtw.safetensors", vgtw_)}, {});
   EXPECT_EQ(vgtw.description.kind, NetworkKind::kVgtw);
   EXPECT_THAT(vgtw.ignored, ElementsAre());
-  ExpectBitEqual(*vgtw.model, *ModelOfFormula(TinyVgtw()));
+  ExpectBitEqual(*vgtw.model, *ModelOfFormula(TinyVgtwNetwork()));
   const auto pi3_path = Write("pi3.safetensors", Weights(TinyPi3()), {});
   ExpectBitEqual(*LoadNetwork({pi3_path}, {}).model, *ModelOfFormula(TinyPi3()));
 }
@@ -178,7 +172,7 @@ TEST_F(LoadNetworkTest, ALaterFileExtendsAndReplacesAnEarlierOne) {
       Write("lora.safetensors", extension, {{kLoraAlphaKey, "1"}, {kCameraHeadsKey, "2"}});
   EXPECT_EQ(LoadNetwork({base_path}, {}).description.kind, NetworkKind::kVggt);
   const LoadedNetwork both = LoadNetwork({base_path, extension_path}, {});
-  ExpectBitEqual(*both.model, *ModelOfFormula(TinyVgtw()));
+  ExpectBitEqual(*both.model, *ModelOfFormula(TinyVgtwNetwork()));
 
   ConvertCheckpoint(OpenWeights({base_path, extension_path}),
                     TensorType::kF32,

@@ -12,7 +12,6 @@
 
 #include <fstream>
 #include <ostream>
-#include <sstream>
 
 #include <ATen/ATen.h>
 #include <nlohmann/json.hpp>
@@ -122,8 +121,7 @@ void AddVggt(const Vggt& model,
       Unproject(outputs.at("depth").squeeze(3), {cameras.cam_from_world, cameras.intrinsics});
   const auto& encoder = model.aggregator().encoder();
   if (!encoder) return;
-  const ChannelStatistics statistics = ImageNetStatistics(images.device());
-  const at::Tensor normalised = (images - statistics.mean) / statistics.deviation;
+  const at::Tensor normalised = NormaliseImages(images);
   outputs["dino.x_prenorm"] = encoder->EncodeWithoutNorm(normalised);
   outputs["dino.x_norm_patchtokens"] = (*encoder)(normalised);
 }
@@ -187,24 +185,6 @@ ParityModel MakeParityModel(const ParityCase& parity_case) {
   return made;
 }
 
-std::map<std::string, Shape> ReadParityShapes(const std::filesystem::path& path) {
-  std::map<std::string, Shape> shapes;
-  std::ifstream file(path);
-  for (std::string line; std::getline(file, line);) {
-    if (line.empty() || line.front() == '#') continue;
-    std::istringstream fields(line);
-    std::string name;
-    std::string sizes;
-    fields >> name >> sizes;
-    Shape& shape = shapes[name];
-    std::istringstream numbers(sizes == "-" ? "" : sizes);
-    for (std::string number; std::getline(numbers, number, 'x');) {
-      shape.push_back(std::stoll(number));
-    }
-  }
-  return shapes;
-}
-
 at::Tensor MakeParityImages(const ParityCase& parity_case) {
   std::vector<uint8_t> bytes =
       ParityImages(parity_case.name, parity_case.num_views, parity_case.height, parity_case.width);
@@ -223,7 +203,7 @@ Outputs RunParityCase(const ParityCase& parity_case, const Model& model) {
   };
   const Features features = model.Encode(images, options);
   const CameraOutputs cameras = model.PredictCameras(features);
-  AddMaps(model.PredictMaps(features, 0, features.num_views()), outputs);
+  AddMaps(model.PredictMaps(features, 0, features.num_views(), {}), outputs);
   if (const auto* pi3 = dynamic_cast<const Pi3*>(&model)) {
     AddPi3(parity_case, *pi3, images, features, cameras, outputs);
   } else {

@@ -6,6 +6,7 @@
 #include "network/config.h"
 #include "network/model.h"
 #include "network/parameters.h"
+#include "tests/parity/parity_formula.h"
 
 #include <cstdint>
 #include <filesystem>
@@ -52,9 +53,6 @@ struct ParityModel {
   std::map<std::string, Shape> shapes;
 };
 ParityModel MakeParityModel(const ParityCase& parity_case);
-
-// The parameters of the official network, from <fixture>.params.tsv.
-std::map<std::string, Shape> ReadParityShapes(const std::filesystem::path& path);
 
 // images [S, 3, H, W] in [0, 1].
 at::Tensor MakeParityImages(const ParityCase& parity_case);

@@ -2,6 +2,8 @@
 #include "tests/parity/parity_formula.h"
 
 #include <cmath>
+#include <fstream>
+#include <sstream>
 #include <functional>
 #include <map>
 #include <numeric>
@@ -115,6 +117,24 @@ std::vector<uint8_t> ParityPixels(const std::string& image_name,
     }
   }
   return pixels;
+}
+
+std::map<std::string, std::vector<int64_t>> ReadParityShapes(const std::filesystem::path& path) {
+  std::map<std::string, std::vector<int64_t>> shapes;
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || line.front() == '#') continue;
+    std::istringstream fields(line);
+    std::string name;
+    std::string sizes;
+    fields >> name >> sizes;
+    std::vector<int64_t>& shape = shapes[name];
+    std::istringstream numbers(sizes == "-" ? "" : sizes);
+    for (std::string number; std::getline(numbers, number, 'x');) {
+      shape.push_back(std::stoll(number));
+    }
+  }
+  return shapes;
 }
 
 }  // namespace vgtw

@@ -5,6 +5,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,6 +29,10 @@ std::vector<float> ParityRandom(const std::string& name, size_t count);
 // A parameter of this official name, row-major; a few biases have given values instead of random
 // ones.
 std::vector<float> ParityWeights(const std::string& name, const std::vector<int64_t>& shape);
+
+// The parameters of an official network: a file of lines "name 3x4", "-" for a scalar, comments
+// beginning with '#'.
+std::map<std::string, std::vector<int64_t>> ReadParityShapes(const std::filesystem::path& path);
 
 // [num_images, 3, height, width], a triangle wave with noise.
 std::vector<uint8_t> ParityPixels(const std::string& image_name,
