@@ -77,6 +77,27 @@ TEST_F(MaskTools, ScoreNeedsOneThingToScore) {
   EXPECT_THAT(run.output, HasSubstr("one of --mask_path and --predictions_path"));
 }
 
+TEST_F(MaskTools, PreviewWritesAPicture) {
+  const std::vector<std::string> args = {"mask",
+                                         "preview",
+                                         "--image_path",
+                                         "@photos",
+                                         "--mask_path",
+                                         "@masks",
+                                         "--output_path",
+                                         "@preview.jpg",
+                                         "--json",
+                                         "@preview.json"};
+  const ColmapRun run = Run(args);
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("a.jpg           50.00"));
+  EXPECT_EQ(ReadRgbImage(folder_ / "preview.jpg").width(), 2 * 400 + 3 * 8);
+  EXPECT_EQ(ReadJson(folder_ / "preview.json")["images"][0]["excluded_share"], 0.5);
+  const ColmapRun again = Run(args);
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_THAT(again.output, HasSubstr("--overwrite"));
+}
+
 TEST_F(MaskTools, UndistortLeavesTheMasksOfPinholes) {
   Reconstruction model;
   model.cameras[1] = MakePinhole(40, 20, 30.0, 30.0);
