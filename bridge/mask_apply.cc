@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/mask_apply.h"
 
-#include "bridge/colmap_model.h"
 #include "bridge/colmap_schema.h"
 #include "bridge/database_edit.h"
 #include "bridge/mask_apply_images.h"
@@ -68,10 +67,10 @@ ApplyMasksSummary ApplyMasks(const fs::path& database_path,
 
   ApplyMasksSummary summary;
   for (const MaskedImage& image : images) summary.images.push_back(image.summary);
-  Reconstruction model;
+  std::optional<MaskedModel> model;
   if (!options.model_path.empty()) {
-    model = ReadModel(options.model_path);
-    summary.model = MaskModel(options.model_path, images, options.rule, model);
+    model.emplace(options.model_path, images);
+    model->RemoveExcluded(options.rule);
   }
   if (options.rule == MaskRule::kTracks) {
     summary.num_linked_keypoints = ExcludeTracks(edit.source(), images, progress);
@@ -81,16 +80,15 @@ ApplyMasksSummary ApplyMasks(const fs::path& database_path,
   const bool removes_keypoints = options.rule == MaskRule::kKeypoints;
   if (removes_keypoints) RemoveKeypoints(edit.target(), images, undo, progress);
   FilterPairs(edit.target(),
-              images,
               {.renumber = removes_keypoints,
                .min_num_inliers = static_cast<uint64_t>(options.min_num_inliers)},
               undo,
               progress,
+              images,
               summary);
-  if (!options.model_path.empty()) {
-    WriteModel(model,
-               options.model_output_path,
-               {.format = ModelFormatOf(options.model_path), .overwrite = options.overwrite});
+  if (model) {
+    model->Disconnect();
+    summary.model = model->Write(options.model_output_path, options.overwrite);
   }
   edit.Commit();
   return summary;

@@ -38,7 +38,8 @@ struct ApplyMasksOptions {
   int min_num_inliers = 15;
   // A sparse model made from this database, and where to write it without its observations of
   // excluded keypoints; points left with one observation go, under kTracks every point that had an
-  // excluded one. Format as read. Both or none.
+  // excluded one. An image whose last geometry went keeps its pose alone, as COLMAP has it for
+  // images without matches (3.8 aborts on others). Format as read. Both or none.
   std::filesystem::path model_path = {};
   std::filesystem::path model_output_path = {};
   // Keep the original of changed rows in the table vgtw_mask_undo, for RestoreMasks. Without, what
@@ -78,6 +79,7 @@ struct ApplyMasksSummary {
   uint64_t num_inlier_matches_after = 0;
   uint64_t num_geometries_before = 0;  // pairs with inlier matches
   uint64_t num_geometries_after = 0;
+  std::vector<std::string> disconnected_images;  // that lost their last geometry; sorted
   std::optional<ApplyMasksModelSummary> model;
 };
 

@@ -37,6 +37,8 @@ struct MaskedImage {
   uint64_t width = 0;
   uint64_t height = 0;
   std::vector<bool> is_excluded;  // per keypoint
+  bool had_geometry = false;      // with inlier matches, before and after FilterPairs
+  bool has_geometry = false;
   ApplyMasksImageSummary summary;
 };
 

@@ -166,10 +166,8 @@ void RemoveRows(SqliteConnection& connection,
 }
 
 struct Counts {
-  uint64_t rows_before = 0;
-  uint64_t rows_after = 0;
-  uint64_t pairs_before = 0;
-  uint64_t pairs_after = 0;
+  uint64_t before = 0;
+  uint64_t after = 0;
 };
 
 // How the matches of a table change.
@@ -207,22 +205,22 @@ class PairFilter {
   std::vector<std::vector<uint32_t>> new_indices_;
 };
 
+// Counts rows; calls visit(pair, kept) for each pair.
+template <typename Visit>
 Counts FilterTable(SqliteConnection& connection,
                    const MaskedTable& table,
                    const std::vector<MaskedImage>& images,
                    const PairFilter& filter,
                    MaskUndo& undo,
-                   ProgressCounter& progress) {
+                   const Visit& visit) {
   Counts counts;
   PairReader reader(connection, table, images);
   while (const auto pair = reader.Next()) {
     const FeatureMatches kept = filter.Filter(*pair);
     if (kept != pair->matches) undo.Rewrite(table, pair->pair_id, kept.size(), AsBlob(kept));
-    counts.rows_before += pair->matches.size();
-    counts.rows_after += kept.size();
-    counts.pairs_before += !pair->matches.empty();
-    counts.pairs_after += !kept.empty();
-    progress.Advance(1);
+    counts.before += pair->matches.size();
+    counts.after += kept.size();
+    visit(*pair, kept);
   }
   return counts;
 }
@@ -268,23 +266,36 @@ void RemoveKeypoints(SqliteConnection& connection,
 }
 
 void FilterPairs(SqliteConnection& connection,
-                 const std::vector<MaskedImage>& images,
                  const FilterPairsOptions& options,
                  MaskUndo& undo,
                  ProgressCounter& progress,
+                 std::vector<MaskedImage>& images,
                  ApplyMasksSummary& summary) {
-  const auto filter = [&](const MaskedTable& table, uint64_t min_num_rows) {
+  const auto filter = [&](const MaskedTable& table, uint64_t min_num_rows, const auto& visit) {
     const PairFilter pair_filter(images, options.renumber, min_num_rows);
-    return FilterTable(connection, table, images, pair_filter, undo, progress);
+    return FilterTable(connection, table, images, pair_filter, undo, visit);
   };
-  const Counts matches = filter(kMatchesTable, 0);
-  const Counts inliers = filter(kTwoViewTable, options.min_num_inliers);
-  summary.num_matches_before = matches.rows_before;
-  summary.num_matches_after = matches.rows_after;
-  summary.num_inlier_matches_before = inliers.rows_before;
-  summary.num_inlier_matches_after = inliers.rows_after;
-  summary.num_geometries_before = inliers.pairs_before;
-  summary.num_geometries_after = inliers.pairs_after;
+  const Counts matches =
+      filter(kMatchesTable, 0, [&](const Pair&, const FeatureMatches&) { progress.Advance(1); });
+  const auto visit_geometry = [&](const Pair& pair, const FeatureMatches& kept) {
+    for (const size_t image_idx : {pair.image_idx1, pair.image_idx2}) {
+      images[image_idx].had_geometry |= !pair.matches.empty();
+      images[image_idx].has_geometry |= !kept.empty();
+    }
+    summary.num_geometries_before += !pair.matches.empty();
+    summary.num_geometries_after += !kept.empty();
+    progress.Advance(1);
+  };
+  const Counts inliers = filter(kTwoViewTable, options.min_num_inliers, visit_geometry);
+  summary.num_matches_before = matches.before;
+  summary.num_matches_after = matches.after;
+  summary.num_inlier_matches_before = inliers.before;
+  summary.num_inlier_matches_after = inliers.after;
+  for (const MaskedImage& image : images) {
+    if (image.had_geometry && !image.has_geometry) {
+      summary.disconnected_images.push_back(image.summary.image_name);
+    }
+  }
 }
 
 }  // namespace vgtw

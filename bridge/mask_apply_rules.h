@@ -30,12 +30,12 @@ struct FilterPairsOptions {
 };
 
 // Removes the rows of matches and two-view geometries with an excluded endpoint. Advances by one
-// per row of the tables.
+// per row of the tables. Tells of each image whether it had and has a geometry.
 void FilterPairs(SqliteConnection& connection,
-                 const std::vector<MaskedImage>& images,
                  const FilterPairsOptions& options,
                  MaskUndo& undo,
                  ProgressCounter& progress,
+                 std::vector<MaskedImage>& images,
                  ApplyMasksSummary& summary);
 
 }  // namespace vgtw

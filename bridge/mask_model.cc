@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/mask_model.h"
 
+#include "bridge/colmap_model.h"
 #include "scene/error.h"
 #include "scene/reprojection.h"
 
 #include <map>
-#include <set>
 #include <string>
 
 namespace vgtw {
 namespace {
 
-const MaskedImage& FindImage(const std::filesystem::path& model_path,
-                             const MaskedImagesById& images,
-                             const Image& image) {
+void CheckImage(const std::filesystem::path& model_path,
+                const MaskedImagesById& images,
+                const Image& image) {
   const std::string name =
       "image " + std::to_string(image.image_id) + " '" + Printable(image.name) + "'";
   const std::string hint = "name the model made from this database, before masks were applied";
@@ -28,7 +28,6 @@ const MaskedImage& FindImage(const std::filesystem::path& model_path,
          "the database's " + std::to_string(num_keypoints) + " keypoints",
          hint);
   }
-  return *found->second;
 }
 
 uint64_t CountObservations(const Reconstruction& reconstruction) {
@@ -39,68 +38,81 @@ uint64_t CountObservations(const Reconstruction& reconstruction) {
   return num_observations;
 }
 
-// Returns the points that lost observations and remain.
-std::set<Point3DId> RemoveObservations(const MaskedImage& masked,
-                                       bool whole_track,
-                                       ImageId image_id,
-                                       Reconstruction& reconstruction) {
-  std::set<Point3DId> changed;
-  const std::vector<Point2D>& points2D = reconstruction.images.at(image_id).points2D;
-  for (uint32_t idx = 0; idx < points2D.size(); ++idx) {
-    if (!masked.is_excluded[idx] || !points2D[idx].HasPoint3D()) continue;
-    const Point3DId point3D_id = points2D[idx].point3D_id;
-    if (whole_track) {
-      RemovePoint3D(reconstruction, point3D_id);
-    } else {
-      RemoveObservation(reconstruction, {image_id, idx});
-      changed.insert(point3D_id);
-    }
-  }
-  return changed;
+}  // namespace
+
+MaskedModel::MaskedModel(const std::filesystem::path& folder,
+                         const std::vector<MaskedImage>& images)
+    : folder_(folder), images_(images), reconstruction_(ReadModel(folder)) {
+  const MaskedImagesById by_id = ById(images);
+  for (const auto& [image_id, image] : reconstruction_.images) CheckImage(folder, by_id, image);
+  summary_.num_observations_before = CountObservations(reconstruction_);
+  summary_.num_points3D_before = reconstruction_.points3D.size();
 }
 
-void RemovePoints2D(const MaskedImagesById& images, Reconstruction& reconstruction) {
-  std::map<ImageId, std::vector<uint32_t>> new_indices;
-  for (auto& [image_id, image] : reconstruction.images) {
-    if (image.points2D.empty()) continue;
-    const std::vector<bool>& is_excluded = images.at(image_id)->is_excluded;
-    new_indices[image_id] = RenumberedIndices(is_excluded);
-    std::vector<Point2D> kept;
-    for (size_t idx = 0; idx < is_excluded.size(); ++idx) {
-      if (!is_excluded[idx]) kept.push_back(image.points2D[idx]);
-    }
-    image.points2D = std::move(kept);
+template <typename Predicate>
+void MaskedModel::RemoveObservations(ImageId image_id, const Predicate& is_removed) {
+  const std::vector<Point2D>& points2D = reconstruction_.images.at(image_id).points2D;
+  for (uint32_t idx = 0; idx < points2D.size(); ++idx) {
+    if (!points2D[idx].HasPoint3D() || !is_removed(idx)) continue;
+    changed_.insert(points2D[idx].point3D_id);
+    RemoveObservation(reconstruction_, {image_id, idx});
   }
-  for (auto& [point3D_id, point] : reconstruction.points3D) {
+}
+
+void MaskedModel::RemoveExcluded(MaskRule rule) {
+  for (const MaskedImage& masked : images_) {
+    const auto image = reconstruction_.images.find(masked.image_id);
+    if (image == reconstruction_.images.end()) continue;
+    RemoveObservations(masked.image_id, [&](uint32_t idx) { return masked.is_excluded[idx]; });
+  }
+  if (rule == MaskRule::kTracks) {
+    for (const Point3DId point3D_id : changed_) {
+      if (reconstruction_.points3D.contains(point3D_id)) {
+        RemovePoint3D(reconstruction_, point3D_id);
+      }
+    }
+  }
+  if (rule == MaskRule::kKeypoints) Renumber();
+}
+
+void MaskedModel::Renumber() {
+  std::map<ImageId, std::vector<uint32_t>> new_indices;
+  for (const MaskedImage& masked : images_) {
+    const auto image = reconstruction_.images.find(masked.image_id);
+    if (image == reconstruction_.images.end() || image->second.points2D.empty()) continue;
+    new_indices[masked.image_id] = RenumberedIndices(masked.is_excluded);
+    std::vector<Point2D> kept;
+    for (size_t idx = 0; idx < masked.is_excluded.size(); ++idx) {
+      if (!masked.is_excluded[idx]) kept.push_back(image->second.points2D[idx]);
+    }
+    image->second.points2D = std::move(kept);
+  }
+  for (auto& [point3D_id, point] : reconstruction_.points3D) {
     for (TrackElement& element : point.track) {
       element.point2D_idx = new_indices.at(element.image_id)[element.point2D_idx];
     }
   }
 }
 
-}  // namespace
+void MaskedModel::Disconnect() {
+  for (const MaskedImage& masked : images_) {
+    const auto image = reconstruction_.images.find(masked.image_id);
+    const bool is_disconnected = masked.had_geometry && !masked.has_geometry;
+    if (image == reconstruction_.images.end() || !is_disconnected) continue;
+    RemoveObservations(masked.image_id, [](uint32_t) { return true; });
+    image->second.points2D.clear();
+  }
+}
 
-ApplyMasksModelSummary MaskModel(const std::filesystem::path& model_path,
-                                 const std::vector<MaskedImage>& masked_images,
-                                 MaskRule rule,
-                                 Reconstruction& reconstruction) {
-  ApplyMasksModelSummary summary;
-  summary.num_observations_before = CountObservations(reconstruction);
-  summary.num_points3D_before = reconstruction.points3D.size();
-  const MaskedImagesById images = ById(masked_images);
-  std::set<Point3DId> changed;
-  for (const auto& [image_id, image] : reconstruction.images) {
-    const MaskedImage& masked = FindImage(model_path, images, image);
-    changed.merge(RemoveObservations(masked, rule == MaskRule::kTracks, image_id, reconstruction));
+ApplyMasksModelSummary MaskedModel::Write(const std::filesystem::path& folder, bool overwrite) {
+  for (const Point3DId point3D_id : changed_) {
+    const auto point = reconstruction_.points3D.find(point3D_id);
+    if (point != reconstruction_.points3D.end()) UpdatePointError(reconstruction_, point->second);
   }
-  if (rule == MaskRule::kKeypoints) RemovePoints2D(images, reconstruction);
-  for (const Point3DId point3D_id : changed) {
-    const auto point = reconstruction.points3D.find(point3D_id);
-    if (point != reconstruction.points3D.end()) UpdatePointError(reconstruction, point->second);
-  }
-  summary.num_observations_after = CountObservations(reconstruction);
-  summary.num_points3D_after = reconstruction.points3D.size();
-  return summary;
+  WriteModel(reconstruction_, folder, {.format = ModelFormatOf(folder_), .overwrite = overwrite});
+  summary_.num_observations_after = CountObservations(reconstruction_);
+  summary_.num_points3D_after = reconstruction_.points3D.size();
+  return summary_;
 }
 
 }  // namespace vgtw

@@ -33,7 +33,13 @@ const std::vector<Command>& Commands() {
       {"mask apply",
        "Take distractors out of an existing COLMAP database",
        DeclareMaskApply,
-       "  vgtw mask apply --database_path a.db --mask_path masks/ --output_path b.db"},
+       "  vgtw mask apply --database_path a.db --mask_path masks/ --output_path b.db\n"
+       "  vgtw mask apply --database_path a.db --mask_path masks/ --output_path b.db --rule "
+       "keypoints --input_path sparse/0 --model_output_path static/"},
+      {"mask restore",
+       "Undo mask apply: every row as it was",
+       DeclareMaskRestore,
+       "  vgtw mask restore --database_path b.db --in_place"},
       {"mask undistort",
        "Masks of photos -> masks of the images that colmap image_undistorter wrote",
        DeclareMaskUndistort,

@@ -19,6 +19,7 @@ std::function<void()> DeclareImport(Flags& flags);
 std::function<void()> DeclareMaskApply(Flags& flags);
 std::function<void()> DeclareMaskConvert(Flags& flags);
 std::function<void()> DeclareMaskMake(Flags& flags);
+std::function<void()> DeclareMaskRestore(Flags& flags);
 std::function<void()> DeclareMaskPreview(Flags& flags);
 std::function<void()> DeclareMaskScore(Flags& flags);
 std::function<void()> DeclareMaskUndistort(Flags& flags);

@@ -68,6 +68,7 @@ TEST_F(MaskApplyTest, TheSummaryCountsKeypointsAndMatches) {
   EXPECT_EQ(summary.num_matches_after, 4u);
   EXPECT_EQ(summary.num_inlier_matches_before, 4u);
   EXPECT_EQ(summary.num_inlier_matches_after, 1u);
+  EXPECT_EQ(summary.disconnected_images, (std::vector<std::string>{"c d.jpg"}));
 }
 
 TEST_F(MaskApplyTest, InPlaceHoldsTheSameRowsAsTheCopy) {

@@ -47,19 +47,29 @@ class MaskModelTest : public testing::Test {
  protected:
   MaskModelTest() {
     MakeSampleDatabase(folder_ / "a.db");
+    {
+      ColmapDatabase database(folder_ / "a.db", ColmapDatabase::Mode::kReadWrite);
+      ColmapDatabase::Transaction transaction(database);
+      // Links keypoint 0 of image 3 to kept ones alone.
+      database.WriteTwoViewGeometry(1, 3, {.config = 2, .inlier_matches = {{1, 0}}});
+      database.WriteTwoViewGeometry(2, 3, {.config = 2, .inlier_matches = {{0, 1}, {4, 1}}});
+      transaction.Commit();
+    }
     WriteSampleMasks(folder_ / "masks");
     model_ =
         SampleModelOfDatabase(ColmapDatabase(folder_ / "a.db", ColmapDatabase::Mode::kReadOnly));
   }
 
   // Writes model_, applies masks to it and the database, and returns what was written.
-  Reconstruction ApplyTo(MaskRule rule, ModelFormat format = ModelFormat::kBinary) {
+  Reconstruction ApplyTo(MaskRule rule,
+                         ModelFormat format = ModelFormat::kBinary,
+                         int min_num_inliers = 0) {
     WriteModel(model_, folder_ / "sparse", {.format = format, .overwrite = true});
     summary_ = ApplyMasks(folder_ / "a.db",
                           folder_ / "masks",
                           folder_ / "b.db",
                           {.rule = rule,
-                           .min_num_inliers = 0,
+                           .min_num_inliers = min_num_inliers,
                            .model_path = folder_ / "sparse",
                            .model_output_path = folder_ / "static",
                            .overwrite = true})
@@ -119,6 +129,18 @@ TEST_F(MaskModelTest, TheKeypointsRuleGivesTheIndicesOfTheDatabase) {
     for (size_t i = 0; i < keypoints.rows; ++i) {
       EXPECT_EQ(image.points2D[i].xy, Eigen::Vector2d(keypoints.x(i), keypoints.y(i)));
     }
+  }
+}
+
+// At least 15 inlier matches empty the geometries of image 2, both of which lost rows.
+TEST_F(MaskModelTest, AnImageWhoseLastGeometryWentKeepsItsPoseAlone) {
+  for (const MaskRule rule : {MaskRule::kMatches, MaskRule::kKeypoints}) {
+    const Reconstruction masked = ApplyTo(rule, ModelFormat::kBinary, 15);
+    EXPECT_EQ(PointsOf(masked), (std::vector<Point3DId>{12}));
+    const uint32_t idx = rule == MaskRule::kMatches ? 2 : 1;
+    EXPECT_EQ(masked.points3D.at(12).track, (std::vector<TrackElement>{{1, idx}, {3, 0}}));
+    EXPECT_TRUE(masked.images.at(2).points2D.empty());
+    EXPECT_FALSE(masked.images.at(1).points2D.empty());
   }
 }
 

@@ -255,6 +255,20 @@ TEST(IsExcluded, TestsTheFlooredPixelAndTreatsOutsideAsExcluded) {
   EXPECT_TRUE(IsExcluded(StaticMask(), 0.0, 0.0));
 }
 
+TEST(DistanceToExcluded, IsThatOfPixelCentres) {
+  StaticMask static_mask(6, 5, 255);
+  static_mask(1, 1) = 0;
+  const Grid<float> distance = DistanceToExcluded(static_mask);
+  EXPECT_EQ(distance(1, 1), 0.0f);
+  EXPECT_EQ(distance(0, 1), 1.0f);
+  EXPECT_FLOAT_EQ(distance(4, 4), std::sqrt(18.0f));
+  EXPECT_FLOAT_EQ(distance(5, 4), 5.0f);
+  EXPECT_EQ(DistanceToExcluded(StaticMask(2, 2, 255))(0, 0),
+            std::numeric_limits<float>::infinity());
+  EXPECT_EQ(DistanceToExcluded(StaticMask(2, 2, 0))(0, 0), 0.0f);
+  EXPECT_TRUE(DistanceToExcluded(StaticMask()).empty());
+}
+
 TEST(ExcludedShare, CountsZeros) {
   StaticMask static_mask(4, 2, 1);
   static_mask(0, 0) = static_mask(3, 1) = 0;
