@@ -2,6 +2,7 @@
 #include "bridge/mask_convert.h"
 
 #include "bridge/import_photos.h"
+#include "bridge/mask_resample.h"
 #include "scene/error.h"
 #include "scene/exif_orientation.h"
 #include "scene/files.h"
@@ -21,41 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 
 using MaskFiles = std::vector<std::vector<fs::path>>;
-
-ImageSize SizeOf(const StaticMask& static_mask) {
-  return {static_cast<uint64_t>(static_mask.width()), static_cast<uint64_t>(static_mask.height())};
-}
-
-PixelMap Scale(double x, double y) {
-  PixelMap map;
-  map << x, 0, 0, 0, y, 0;
-  return map;
-}
-
-PixelMap Compose(const PixelMap& c_from_b, const PixelMap& b_from_a) {
-  PixelMap c_from_a = c_from_b.leftCols<2>() * b_from_a;
-  c_from_a.col(2) += c_from_b.col(2);
-  return c_from_a;
-}
-
-// The nearest pixel of `static_mask` under each centre of an image of `size`; kept outside of it.
-StaticMask Resample(const StaticMask& static_mask, const PixelMap& mask_from_out, ImageSize size) {
-  if (size == SizeOf(static_mask) && mask_from_out == IdentityPixelMap()) return static_mask;
-  StaticMask out(static_cast<int>(size.width), static_cast<int>(size.height), 255);
-  for (int y = 0; y < out.height(); ++y) {
-    for (int x = 0; x < out.width(); ++x) {
-      const Eigen::Vector2d pixel = Apply(mask_from_out, {x + 0.5, y + 0.5});
-      const int mask_x = static_cast<int>(std::floor(pixel.x()));
-      const int mask_y = static_cast<int>(std::floor(pixel.y()));
-      if (static_mask.Contains(mask_x, mask_y)) out(x, y) = static_mask(mask_x, mask_y);
-    }
-  }
-  return out;
-}
-
-void Invert(StaticMask& static_mask) {
-  for (uint8_t& value : static_mask.data()) value = static_cast<uint8_t>(255 - value);
-}
 
 // 255 where a pixel is marked.
 StaticMask ReadMarks(const MaskConvention& convention, const fs::path& path) {
@@ -86,17 +52,9 @@ std::optional<PixelMap> Dust3rFromPhoto(const ImageSize& photo, const ImageSize&
   if (mask != ImageSize{static_cast<uint64_t>(2 * half_w), static_cast<uint64_t>(2 * half_h)}) {
     return std::nullopt;
   }
-  PixelMap map = Scale(resized_w / w, resized_h / h);
+  PixelMap map = ScaleMap(resized_w / w, resized_h / h);
   map.col(2) << half_w - resized_w / 2, half_h - resized_h / 2;
   return map;
-}
-
-// Whether both sides are scaled alike, but for cutting or rounding each to whole pixels, which
-// moves this difference of products by at most the longer side.
-bool IsScaled(const ImageSize& mask, const ImageSize& photo) {
-  const double difference = static_cast<double>(mask.width) * static_cast<double>(photo.height) -
-                            static_cast<double>(mask.height) * static_cast<double>(photo.width);
-  return std::abs(difference) <= static_cast<double>(std::max(photo.width, photo.height));
 }
 
 // The map from the photo (in the convention's frame) into a mask file, by the rule of sizes.
@@ -109,8 +67,8 @@ PixelMap MaskFromPhoto(const MaskConvention& convention,
     if (const auto map = Dust3rFromPhoto(photo, mask)) return *map;
   }
   if (convention.size == MaskSize::kScaled && IsScaled(mask, photo)) {
-    return Scale(static_cast<double>(mask.width) / static_cast<double>(photo.width),
-                 static_cast<double>(mask.height) / static_cast<double>(photo.height));
+    return ScaleMap(static_cast<double>(mask.width) / static_cast<double>(photo.width),
+                    static_cast<double>(mask.height) / static_cast<double>(photo.height));
   }
   const auto text = [](const ImageSize& size) {
     return std::to_string(size.width) + " x " + std::to_string(size.height) + " pixels";
@@ -140,26 +98,21 @@ StaticMask Encoded(const MaskConvention& convention,
   return file;
 }
 
-bool Contains(const fs::path& folder, const fs::path& path) {
-  const fs::path relative =
-      fs::weakly_canonical(path).lexically_relative(fs::weakly_canonical(folder));
-  return !relative.empty() && *relative.begin() != "..";
-}
-
 // The photos of a folder in which masks may lie, too.
 std::vector<Photo> ListPhotosOnly(const fs::path& image_folder,
                                   const fs::path& mask_folder,
                                   const MaskConvention& from,
                                   int num_threads) {
   std::vector<Photo> photos = ListPhotos(image_folder, num_threads);
-  if (!Contains(image_folder, mask_folder)) return photos;
+  if (!IsInFolder(image_folder, mask_folder)) return photos;
   const bool is_same = fs::equivalent(image_folder, mask_folder);
   std::vector<std::string> names;
   for (const Photo& photo : photos) names.push_back(photo.name);
   const std::vector<std::string> mask_names = MaskNames(from, names);
   const std::set<std::string> masks(mask_names.begin(), mask_names.end());
   std::erase_if(photos, [&](const Photo& photo) {
-    return is_same ? masks.contains(photo.name) : Contains(mask_folder, image_folder / photo.name);
+    return is_same ? masks.contains(photo.name)
+                   : IsInFolder(mask_folder, image_folder / photo.name);
   });
   if (photos.empty()) Fail(image_folder, "holds masks only", "photos");
   return photos;
@@ -218,14 +171,6 @@ void CheckTargets(const MaskConvention& to,
   }
 }
 
-void CheckOutput(const fs::path& output_folder, const fs::path& input_folder) {
-  if (!Contains(output_folder, input_folder)) return;
-  Fail(output_folder,
-       "holds " + Printable(input_folder.string()) + ", which is read",
-       "another folder to write",
-       "copy the files afterwards");
-}
-
 // PNG under any name, also "a.jpg".
 void WritePng(const fs::path& folder, const std::string& name, const StaticMask& file, size_t idx) {
   // No photo's name begins with a dot, so that no mask of another one is overwritten.
@@ -277,8 +222,8 @@ std::vector<MaskSummary> ConvertMasks(const fs::path& image_folder,
                 ", which is the output of a segmenter, expected a convention of a tool that reads "
                 "masks");
   }
-  CheckOutput(output_folder, image_folder);
-  CheckOutput(output_folder, mask_folder);
+  CheckNotInput(output_folder, image_folder);
+  CheckNotInput(output_folder, mask_folder);
   const std::vector<Photo> photos =
       ListPhotosOnly(image_folder, mask_folder, from, options.num_threads);
   std::vector<std::string> names;

@@ -63,6 +63,21 @@ void CheckMasksExist(const std::filesystem::path& mask_folder,
        "write all-white ones, or allow missing masks");
 }
 
+bool IsInFolder(const std::filesystem::path& folder, const std::filesystem::path& path) {
+  const std::filesystem::path relative = std::filesystem::weakly_canonical(path).lexically_relative(
+      std::filesystem::weakly_canonical(folder));
+  return !relative.empty() && *relative.begin() != "..";
+}
+
+void CheckNotInput(const std::filesystem::path& output_folder,
+                   const std::filesystem::path& input_folder) {
+  if (!IsInFolder(output_folder, input_folder)) return;
+  Fail(output_folder,
+       "holds " + Printable(input_folder.string()) + ", which is read",
+       "another folder to write",
+       "copy the files afterwards");
+}
+
 std::vector<MaskSummary> WriteMaskFolder(const std::filesystem::path& mask_folder,
                                          bool overwrite,
                                          size_t num_masks,

@@ -37,6 +37,13 @@ void CheckMasksExist(const std::filesystem::path& mask_folder,
                      const std::vector<std::string>& image_names,
                      bool allow_missing);
 
+// Whether `path` is `folder` or lies below it; neither need exist.
+bool IsInFolder(const std::filesystem::path& folder, const std::filesystem::path& path);
+
+// Throws Error if `output_folder` is or holds `input_folder`, which is read.
+void CheckNotInput(const std::filesystem::path& output_folder,
+                   const std::filesystem::path& input_folder);
+
 struct MaskSummary {
   std::string image_name;
   double excluded_share = 0.0;  // of the image's pixels, in [0,1]

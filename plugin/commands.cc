@@ -24,6 +24,11 @@ const std::vector<Command>& Commands() {
        "Predictions -> COLMAP masks",
        DeclareMaskMake,
        "  vgtw mask make --predictions_path predictions/ --output_path masks/ --dilate_px 10"},
+      {"mask lint",
+       "What COLMAP would do with each mask, and what is wrong with it",
+       DeclareMaskLint,
+       "  vgtw mask lint --image_path photos/ --mask_path masks/ --database_path a.db\n"
+       "  vgtw mask lint --image_path photos/ --mask_path masks/ --fix mended_masks/"},
       {"mask convert",
        "Masks of one tool -> masks of another",
        DeclareMaskConvert,

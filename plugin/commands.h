@@ -18,6 +18,7 @@ std::function<void()> DeclareDoctor(Flags& flags);
 std::function<void()> DeclareImport(Flags& flags);
 std::function<void()> DeclareMaskApply(Flags& flags);
 std::function<void()> DeclareMaskConvert(Flags& flags);
+std::function<void()> DeclareMaskLint(Flags& flags);
 std::function<void()> DeclareMaskMake(Flags& flags);
 std::function<void()> DeclareMaskRestore(Flags& flags);
 std::function<void()> DeclareMaskPreview(Flags& flags);

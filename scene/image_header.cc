@@ -94,12 +94,6 @@ std::optional<ImageSize> ParseJpegSize(Bytes file) {
   return std::nullopt;
 }
 
-constexpr size_t kBitDepth = 8;  // offsets in a PNG's header
-constexpr size_t kColourType = 9;
-constexpr std::byte kGray{0};
-constexpr std::byte kGrayWithAlpha{4};
-constexpr std::byte kRgbWithAlpha{6};
-
 // Width and height (u32), bit depth, colour type, ...; empty for other files.
 Bytes FindPngHeader(Bytes file) {
   constexpr size_t kNumBytes = 13;
@@ -143,16 +137,30 @@ std::optional<ImageSize> ParseImageSize(Bytes file) {
   return std::nullopt;
 }
 
-bool IsGrayPng(Bytes file) {
+std::optional<PngFormat> ParsePngFormat(Bytes file) {
+  constexpr size_t kBitDepth = 8;  // offsets in the header
+  constexpr size_t kColour = 9;
   const Bytes header = FindPngHeader(file);
-  return !header.empty() && header[kBitDepth] == std::byte{8} && header[kColourType] == kGray;
+  if (header.empty()) return std::nullopt;
+  const auto bit_depth = std::to_integer<int>(header[kBitDepth]);
+  const auto colour = std::to_integer<int>(header[kColour]);
+  const bool is_depth =
+      bit_depth == 1 || bit_depth == 2 || bit_depth == 4 || bit_depth == 8 || bit_depth == 16;
+  const bool is_colour = colour == 0 || colour == 2 || colour == 3 || colour == 4 || colour == 6;
+  if (!is_depth || !is_colour) return std::nullopt;
+  return PngFormat{bit_depth, static_cast<PngColour>(colour)};
+}
+
+bool IsGrayPng(Bytes file) {
+  const auto format = ParsePngFormat(file);
+  return format && format->bit_depth == 8 && format->colour == PngColour::kGray;
 }
 
 bool HasAlphaForPython(Bytes file) {
-  const Bytes header = FindPngHeader(file);
-  if (header.empty()) return false;
-  return header[kColourType] == kRgbWithAlpha ||
-         (header[kColourType] == kGrayWithAlpha && header[kBitDepth] == std::byte{16});
+  const auto format = ParsePngFormat(file);
+  if (!format) return false;
+  return format->colour == PngColour::kRgbWithAlpha ||
+         (format->colour == PngColour::kGrayWithAlpha && format->bit_depth == 16);
 }
 
 bool IsTruncated(Bytes file) {

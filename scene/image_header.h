@@ -15,6 +15,16 @@ namespace vgtw {
 // Size of a JPEG (first frame header) or PNG (IHDR); nullopt for other or damaged files.
 std::optional<ImageSize> ParseImageSize(std::span<const std::byte> file);
 
+enum class PngColour { kGray = 0, kRgb = 2, kPalette = 3, kGrayWithAlpha = 4, kRgbWithAlpha = 6 };
+
+struct PngFormat {
+  int bit_depth = 0;  // of a channel, or of an index into the palette: 1, 2, 4, 8 or 16
+  PngColour colour = PngColour::kGray;
+};
+
+// What a PNG's header says of its pixels; nullopt for other or damaged files.
+std::optional<PngFormat> ParsePngFormat(std::span<const std::byte> file);
+
 // Whether a PNG has one channel of 8 bits: gray without palette or alpha, as masks are written.
 bool IsGrayPng(std::span<const std::byte> file);
 

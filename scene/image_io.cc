@@ -122,32 +122,46 @@ ImageSize ReadImageSize(const fs::path& path) {
   return {static_cast<uint64_t>(pixels.cols), static_cast<uint64_t>(pixels.rows)};
 }
 
-StaticMask ReadStaticMask(const fs::path& path) {
+GrayImage ReadMaskValues(const fs::path& path) {
   const MappedFile file(path);
-  StaticMask static_mask;
   if (IsGrayPng(file.bytes())) {  // a third of the time
     const cv::Mat gray = Decode(path, file.bytes(), cv::IMREAD_GRAYSCALE);
-    static_mask = StaticMask(gray.cols, gray.rows);
-    std::transform(
-        gray.datastart, gray.dataend, static_mask.data().begin(), [](uint8_t value) -> uint8_t {
-          return value == 0 ? 0 : 255;
-        });
-    return static_mask;
+    GrayImage values(gray.cols, gray.rows);
+    std::copy(gray.datastart, gray.dataend, values.data().begin());
+    return values;
   }
   const cv::Mat bgr = Decode(path, file.bytes(), cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH);
   if (bgr.depth() != CV_8U) {
     Fail(path, "has more than 8 bits per channel", "an 8-bit mask", "COLMAP 3.8 drops its image");
   }
-  static_mask = StaticMask(bgr.cols, bgr.rows);
+  GrayImage values(bgr.cols, bgr.rows);
   std::transform(bgr.begin<cv::Vec3b>(),
                  bgr.end<cv::Vec3b>(),
-                 static_mask.data().begin(),
-                 [](const cv::Vec3b& pixel) -> uint8_t {
+                 values.data().begin(),
+                 [](const cv::Vec3b& pixel) {
                    // COLMAP's library turns colour into luma of Rec. 709 and rounds it.
                    const double luma = 0.0722 * pixel[0] + 0.7152 * pixel[1] + 0.2126 * pixel[2];
-                   return luma >= 0.5 ? 255 : 0;
+                   return static_cast<uint8_t>(luma + 0.5);
                  });
+  return values;
+}
+
+StaticMask ReadStaticMask(const fs::path& path) {
+  StaticMask static_mask = ReadMaskValues(path);
+  for (uint8_t& value : static_mask.data()) value = value == 0 ? 0 : 255;
   return static_mask;
+}
+
+std::optional<GrayImage> ReadAlpha(const fs::path& path) {
+  const MappedFile file(path);
+  const cv::Mat bgra = Decode(path, file.bytes(), cv::IMREAD_UNCHANGED);
+  if (bgra.type() != CV_8UC4) return std::nullopt;
+  GrayImage alpha(bgra.cols, bgra.rows);
+  std::transform(bgra.begin<cv::Vec4b>(),
+                 bgra.end<cv::Vec4b>(),
+                 alpha.data().begin(),
+                 [](const cv::Vec4b& pixel) { return pixel[3]; });
+  return alpha;
 }
 
 void WriteImage(const fs::path& path, const RgbImage& image) {

@@ -38,9 +38,15 @@ RgbImage ReadRgbImageOnWhite(const std::filesystem::path& path);
 // Size from the file's header only where the format allows (JPEG, PNG), else by decoding.
 ImageSize ReadImageSize(const std::filesystem::path& path);
 
-// A mask file as COLMAP reads it: any non-zero gray value is kept (255). Throws Error as above, and
-// for 16-bit files, which COLMAP 3.8 refuses.
+// The gray values of a mask file as COLMAP reads it: luma of colours, alpha dropped. Throws Error
+// as above, and for 16-bit files, which COLMAP 3.8 refuses.
+GrayImage ReadMaskValues(const std::filesystem::path& path);
+
+// The same as a mask: any non-zero value is kept (255).
 StaticMask ReadStaticMask(const std::filesystem::path& path);
+
+// The alpha channel in 8 bits; nullopt if the file has none, or more than 8 bits a channel.
+std::optional<GrayImage> ReadAlpha(const std::filesystem::path& path);
 
 // 8-bit PNG (or JPEG by extension), written atomically; parent folders are created.
 void WriteImage(const std::filesystem::path& path, const RgbImage& image);

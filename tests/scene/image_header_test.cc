@@ -55,6 +55,20 @@ TEST(ParseImageSize, IsUnknownForOtherAndEmptyImages) {
   EXPECT_EQ(ParseImageSize(Bytes("\xff\xd8\xff\xd9")), std::nullopt);
 }
 
+TEST(ParsePngFormat, SaysDepthAndColour) {
+  for (const int colour : {0, 2, 3, 4, 6}) {
+    const auto format = ParsePngFormat(Bytes(MakePng(1, 1, 16, colour, "")));
+    ASSERT_TRUE(format);
+    EXPECT_EQ(format->bit_depth, 16);
+    EXPECT_EQ(static_cast<int>(format->colour), colour);
+  }
+  EXPECT_EQ(ParsePngFormat(Bytes(MakePng(1, 1, 1, 0, "")))->bit_depth, 1);
+  EXPECT_FALSE(ParsePngFormat(Bytes(MakePng(1, 1, 7, 0, ""))));
+  EXPECT_FALSE(ParsePngFormat(Bytes(MakePng(1, 1, 8, 5, ""))));
+  EXPECT_FALSE(ParsePngFormat(Bytes(EncodedImage("a.jpg"))));
+  EXPECT_FALSE(ParsePngFormat({}));
+}
+
 TEST(IsGrayPng, IsOneChannelOf8Bits) {
   EXPECT_TRUE(IsGrayPng(Bytes(MakePng(2, 1, 8, 0, std::string(3, '\0')))));
   EXPECT_FALSE(IsGrayPng(Bytes(MakePng(2, 1, 1, 0, std::string(2, '\0')))));

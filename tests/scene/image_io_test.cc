@@ -158,6 +158,35 @@ TEST(ReadImageSize, DecodesFormatsWithoutAKnownHeader) {
             (std::vector<Rgb>{{'a', 'b', 'c'}, {'d', 'e', 'f'}}));
 }
 
+// 0.2126 R + 0.7152 G + 0.0722 B, rounded: white 255, red 100 21.3, blue 7 0.505, blue 6 0.433.
+TEST(ReadMaskValues, AreLuma) {
+  const TemporaryFolder folder;
+  WriteFileAtomically(
+      folder / "rgb.png",
+      MakePng(4, 1, 8, 2, std::string("\0\xff\xff\xff\x64\0\0\0\0\x07\0\0\x06", 13)));
+  EXPECT_EQ(ReadMaskValues(folder / "rgb.png").data(), (std::vector<uint8_t>{255, 21, 1, 0}));
+  WriteFileAtomically(folder / "one_bit.png", MakePng(4, 1, 1, 0, std::string("\0\x50", 2)));
+  EXPECT_EQ(ReadMaskValues(folder / "one_bit.png").data(), (std::vector<uint8_t>{0, 255, 0, 255}));
+}
+
+TEST(ReadAlpha, IsTheFourthChannelOrNone) {
+  const TemporaryFolder folder;
+  WriteFileAtomically(folder / "rgba.png",
+                      MakePng(2, 1, 8, 6, std::string("\0\1\2\3\x80\1\2\3\0", 9)));
+  EXPECT_EQ(ReadAlpha(folder / "rgba.png")->data(), (std::vector<uint8_t>{128, 0}));
+  WriteFileAtomically(folder / "gray_alpha.png", MakePng(1, 1, 8, 4, std::string("\0\1\x05", 3)));
+  EXPECT_EQ(ReadAlpha(folder / "gray_alpha.png")->data(), (std::vector<uint8_t>{5}));
+  const std::string palette = PngChunk("PLTE", std::string("\0\0\0\x05\x06\x07", 6)) +
+                              PngChunk("tRNS", std::string("\0\x80", 2));
+  WriteFileAtomically(folder / "palette.png",
+                      MakePng(2, 1, 8, 3, std::string("\0\1\0", 3), palette));
+  EXPECT_EQ(ReadAlpha(folder / "palette.png")->data(), (std::vector<uint8_t>{128, 0}));
+  WriteImage(folder / "opaque.png", GrayImage(2, 1, 9));
+  EXPECT_EQ(ReadAlpha(folder / "opaque.png"), std::nullopt);
+  WriteFileAtomically(folder / "deep.png", MakePng(1, 1, 16, 6, std::string(9, '\0')));
+  EXPECT_EQ(ReadAlpha(folder / "deep.png"), std::nullopt);
+}
+
 TEST(ReadStaticMask, KeepsEveryNonZeroGray) {
   const TemporaryFolder folder;
   WriteFileAtomically(folder / "gray.png", MakePng(4, 1, 8, 0, std::string("\0\0\x01\x80\xff", 5)));

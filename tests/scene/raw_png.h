@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -24,8 +26,7 @@ inline std::string PngChunk(const std::string& type, const std::string& data) {
 }
 
 // A PNG of any colour type, which the library under test cannot write. `rows` are the image's
-// packed rows, each after a filter byte 0, at most 65535 bytes; `extra_chunks` stand before them
-// (palette).
+// packed rows, each after a filter byte 0; `extra_chunks` stand before them (palette).
 inline std::string MakePng(uint32_t width,
                            uint32_t height,
                            int bit_depth,
@@ -38,17 +39,21 @@ inline std::string MakePng(uint32_t width,
     a = (a + static_cast<uint8_t>(c)) % 65521;
     b = (b + a) % 65521;
   }
-  const auto size = static_cast<uint32_t>(rows.size());
-  const auto low_byte = [](uint32_t value) { return static_cast<char>(value & 0xff); };
-  // A zlib stream of one stored block.
-  const std::string zlib = std::string{'\x78',
-                                       '\x01',
-                                       '\x01',
-                                       low_byte(size),
-                                       low_byte(size >> 8),
-                                       low_byte(~size),
-                                       low_byte(~size >> 8)} +
-                           rows + BigEndianBytes(b << 16 | a);
+  const auto low_byte = [](size_t value) { return static_cast<char>(value & 0xff); };
+  // A zlib stream of stored blocks.
+  std::string zlib = "\x78\x01";
+  constexpr size_t kMaxBlock = 65535;
+  for (size_t begin = 0; begin == 0 || begin < rows.size(); begin += kMaxBlock) {
+    const size_t size = std::min(kMaxBlock, rows.size() - begin);
+    const bool is_last = begin + size == rows.size();
+    zlib += {is_last ? '\1' : '\0',
+             low_byte(size),
+             low_byte(size >> 8),
+             low_byte(~size),
+             low_byte(~size >> 8)};
+    zlib += rows.substr(begin, size);
+  }
+  zlib += BigEndianBytes(b << 16 | a);
   const std::string header =
       BigEndianBytes(width) + BigEndianBytes(height) +
       std::string{static_cast<char>(bit_depth), static_cast<char>(colour_type), '\0', '\0', '\0'};
