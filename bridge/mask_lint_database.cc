@@ -113,6 +113,17 @@ class EvidenceCollector {
   MatchEvidence evidence_;
 };
 
+// Scale and orientation, up to two thirds of the bytes, say nothing of masks.
+Keypoints PositionsOf(const Keypoints& keypoints) {
+  Keypoints positions{.rows = keypoints.rows, .cols = 2, .data = {}};
+  positions.data.reserve(size_t{2} * keypoints.rows);
+  for (size_t i = 0; i < keypoints.rows; ++i) {
+    positions.data.push_back(keypoints.x(i));
+    positions.data.push_back(keypoints.y(i));
+  }
+  return positions;
+}
+
 // Over all images.
 MatchEvidence::Image Sum(const MatchEvidence& evidence) {
   MatchEvidence::Image sum;
@@ -137,7 +148,9 @@ LintKeypointsByName ReadLintKeypoints(const ColmapDatabase& database) {
   LintKeypointsByName keypoints_by_name;
   for (const DatabaseImage& image : database.ReadImages()) {
     LintKeypoints keypoints{.image_id = image.image_id};
-    if (auto read = database.ReadKeypoints(image.image_id)) keypoints.keypoints = std::move(*read);
+    if (const auto read = database.ReadKeypoints(image.image_id)) {
+      keypoints.keypoints = PositionsOf(*read);
+    }
     keypoints.is_excluded.assign(keypoints.keypoints.rows, false);
     keypoints_by_name.emplace(image.name, std::move(keypoints));
   }

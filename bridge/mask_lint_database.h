@@ -17,7 +17,7 @@ namespace vgtw {
 // The keypoints of one image of a database.
 struct LintKeypoints {
   ImageId image_id = 0;
-  Keypoints keypoints = {};
+  Keypoints keypoints = {};            // x and y alone
   std::vector<bool> is_excluded = {};  // as long as them
   bool is_evidence = false;            // the mask has the photo's size, so that it can be judged
 };

@@ -139,7 +139,12 @@ class NameMatcher {
 
   void MatchOtherConvention() {
     std::vector<std::string> names;
-    for (const LintImage& image : images_) names.push_back(image.name);
+    bool has_all = true;
+    for (const LintImage& image : images_) {
+      names.push_back(image.name);
+      has_all &= !image.mask_names.empty();
+    }
+    if (has_all) return;
     const MaskConvention* convention = GuessTellingConvention(names);
     if (convention == nullptr) return;
     std::vector<std::vector<fs::path>> found;
