@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace vgtw {
@@ -22,19 +21,10 @@ StaticView::StaticView(ViewPrediction prediction, double distractor_threshold)
     : prediction_(std::move(prediction)),
       distractor_threshold_(distractor_threshold),
       network_from_original_(Inverse(prediction_.view.original_from_network)) {
-  if (prediction_.depth.empty()) TakeDepthFromPoints();
-  if (prediction_.depth.empty()) BinSamples();
-}
-
-void StaticView::TakeDepthFromPoints() {
-  const Grid<Eigen::Vector3f>& points = prediction_.points;
-  prediction_.depth = DepthMap(points.width(), points.height());
-  for (size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3d point = points.data()[i].cast<double>();
-    const double depth = (prediction_.view.cam_from_world * point).z();
-    prediction_.depth.data()[i] =
-        depth > 0.0 ? static_cast<float>(depth) : std::numeric_limits<float>::quiet_NaN();
+  if (prediction_.depth.empty()) {
+    prediction_.depth = DepthFromPoints(prediction_.view, prediction_.points);
   }
+  if (prediction_.depth.empty()) BinSamples();
 }
 
 void StaticView::BinSamples() {

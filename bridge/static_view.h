@@ -38,7 +38,6 @@ class StaticView {
                                      double max_relative_depth_difference) const;
 
  private:
-  void TakeDepthFromPoints();
   void BinSamples();
   bool IsStatic(const Eigen::Vector2d& pixel_in_original) const;
   Eigen::Array2i BinOf(const Eigen::Vector2d& pixel_in_original) const;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace vgtw {
 namespace {
@@ -68,6 +69,15 @@ std::optional<Eigen::Vector3d> UnprojectPixel(const View& view,
   if (!ray) return std::nullopt;
   const Eigen::Vector3d point_in_cam = depth(x, y) * ray->homogeneous();
   return Inverse(view.cam_from_world) * point_in_cam;
+}
+
+DepthMap DepthFromPoints(const View& view, const Grid<Eigen::Vector3f>& points) {
+  DepthMap depth(points.width(), points.height());
+  for (size_t i = 0; i < points.size(); ++i) {
+    const double z = (view.cam_from_world * points.data()[i].cast<double>()).z();
+    depth.data()[i] = z > 0.0 ? static_cast<float>(z) : std::numeric_limits<float>::quiet_NaN();
+  }
+  return depth;
 }
 
 }  // namespace vgtw

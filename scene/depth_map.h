@@ -28,4 +28,7 @@ std::optional<Eigen::Vector3d> UnprojectPixel(const View& view,
                                               int x,
                                               int y);
 
+// z-depths of world points [H,W] in the view's camera; unknown where a point is or lies behind it.
+DepthMap DepthFromPoints(const View& view, const Grid<Eigen::Vector3f>& points);
+
 }  // namespace vgtw

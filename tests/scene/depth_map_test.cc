@@ -119,5 +119,23 @@ TEST(UnprojectPixel, ProjectsBackToThePixel) {
   }
 }
 
+TEST(DepthFromPoints, UndoesUnprojectPixel) {
+  const View view = MakeView();
+  DepthMap depth(50, 40, 2.5f);
+  depth(3, 4) = kUnknown;
+  Grid<Eigen::Vector3f> points(50, 40, Eigen::Vector3f::Constant(kUnknown));
+  for (int y = 0; y < 40; ++y) {
+    for (int x = 0; x < 50; ++x) {
+      if (const auto point = UnprojectPixel(view, depth, x, y)) points(x, y) = point->cast<float>();
+    }
+  }
+  // In the camera's plane, as its translation along z is 3.
+  points(5, 6) = {0.0f, 0.0f, -3.0f};
+  const DepthMap result = DepthFromPoints(view, points);
+  EXPECT_TRUE(std::isnan(result(3, 4)));
+  EXPECT_TRUE(std::isnan(result(5, 6)));
+  EXPECT_NEAR(result(49, 39), 2.5f, kFloatRounding);
+}
+
 }  // namespace
 }  // namespace vgtw
