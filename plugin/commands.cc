@@ -58,6 +58,11 @@ const std::vector<Command>& Commands() {
        "Photos with what their masks exclude, as a picture",
        DeclareMaskPreview,
        "  vgtw mask preview --image_path photos/ --mask_path masks/ --output_path preview.jpg"},
+      {"mask vote",
+       "Masks of predictions mended by the depths of the other views",
+       DeclareMaskVote,
+       "  vgtw mask vote --predictions_path predictions/ --output_path voted/\n"
+       "  vgtw mask make --predictions_path voted/ --output_path masks/"},
       {"seed",
        "Predictions (and database) -> COLMAP model",
        DeclareSeed,
