@@ -7,6 +7,7 @@
 #include "scene/error.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -51,9 +52,13 @@ class PairReader {
     pair.image_idx1 = FindImage(image_id1, name);
     pair.image_idx2 = FindImage(image_id2, name);
     pair.matches = ReadMatchesBlob(query, 1, name);
+    std::array<uint32_t, 2> largest = {0, 0};
     for (const auto& [point2D_idx1, point2D_idx2] : pair.matches) {
-      CheckIndex(pair.image_idx1, point2D_idx1, name);
-      CheckIndex(pair.image_idx2, point2D_idx2, name);
+      largest = {std::max(largest[0], point2D_idx1), std::max(largest[1], point2D_idx2)};
+    }
+    if (!pair.matches.empty()) {
+      CheckIndex(pair.image_idx1, largest[0], name);
+      CheckIndex(pair.image_idx2, largest[1], name);
     }
     return pair;
   }

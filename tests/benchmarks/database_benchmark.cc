@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// database_benchmark [NUM_IMAGES [NUM_REPEATS]]
-// Writes databases of NUM_IMAGES and of a quarter of that (8000 SIFT keypoints per image, matches
-// with 10 neighbours), applies masks to them, and compares in the same run with `cp`, with
-// sqlite3's .backup and with colmap's feature_importer. Every figure is the fastest of NUM_REPEATS
-// runs, each in a process of its own, whose peak memory is that of this stage alone. Needs 4 GB
-// below the folder for temporary files for 1000 images, and removes them.
+// database_benchmark [NUM_IMAGES [NUM_REPEATS [NUM_NEIGHBOURS]]]
+// Writes databases of NUM_IMAGES and of a quarter of that (8000 SIFT keypoints per image, 800
+// matches with each of 10 neighbours), applies masks to them by each rule and restores them, and
+// compares in the same run with `cp`, with sqlite3's .backup and with colmap's feature_importer.
+// Every figure is the fastest of NUM_REPEATS runs, each in a process of its own, whose peak memory
+// is that of this stage alone. Needs 4 GB below the folder for temporary files for 1000 images and
+// 10 neighbours, 11 GB for 100, and removes them.
 #include "bridge/colmap_database.h"
 #include "bridge/mask_apply.h"
 #include "bridge/mask_files.h"
+#include "bridge/mask_restore.h"
 #include "scene/error.h"
 #include "scene/image_io.h"
 
@@ -31,7 +33,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr uint32_t kNumKeypoints = 8000;
 constexpr uint32_t kNumMatches = 800;
-constexpr ImageId kNumNeighbours = 10;
 constexpr int kWidth = 2000;
 constexpr int kHeight = 1500;
 
@@ -91,7 +92,7 @@ Keypoints RandomKeypoints(uint32_t seed) {
   return keypoints;
 }
 
-void WriteDatabase(const fs::path& path, ImageId num_images) {
+void WriteDatabase(const fs::path& path, ImageId num_images, ImageId num_neighbours) {
   ColmapDatabase database = ColmapDatabase::Create(path);
   ColmapDatabase::Transaction transaction(database);
   Camera camera = MakePinhole(kWidth, kHeight, 1500.0, 1500.0);
@@ -108,7 +109,7 @@ void WriteDatabase(const fs::path& path, ImageId num_images) {
     database.WriteImage({image_id, NameOf(image_id), 1});
     database.WriteKeypoints(image_id, keypoints);
     database.WriteDescriptors(image_id, descriptors);
-    for (ImageId other = image_id - std::min(image_id, kNumNeighbours); other < image_id; ++other) {
+    for (ImageId other = image_id - std::min(image_id, num_neighbours); other < image_id; ++other) {
       if (other == 0) continue;
       database.WriteMatches(other, image_id, matches);
       database.WriteTwoViewGeometry(other, image_id, geometry);
@@ -133,14 +134,18 @@ void WriteMaskFiles(const fs::path& mask_folder, ImageId num_images) {
   for (ImageId i = 2; i <= num_images; ++i) fs::copy_file(first, MaskPath(mask_folder, NameOf(i)));
 }
 
-void MeasureDatabase(const fs::path& folder, ImageId num_images, int num_repeats) {
+void MeasureDatabase(const fs::path& folder,
+                     ImageId num_images,
+                     ImageId num_neighbours,
+                     int num_repeats) {
   const fs::path a = folder / "a.db";
   const fs::path b = folder / "b.db";
   const fs::path masks = folder / "masks";
   const auto remove_a = [&] { fs::remove(a); };
   const auto remove_b = [&] { fs::remove(b); };
   const double num_keypoints = 1.0 * num_images * kNumKeypoints;
-  const Cost write = MeasureFastest(num_repeats, remove_a, [&] { WriteDatabase(a, num_images); });
+  const Cost write =
+      MeasureFastest(num_repeats, remove_a, [&] { WriteDatabase(a, num_images, num_neighbours); });
   MeasureOnce([&] { WriteMaskFiles(masks, num_images); });
   const std::string from_to = a.string() + " " + b.string();
   const Cost cp = MeasureFastest(num_repeats, remove_b, Command("cp " + from_to));
@@ -153,10 +158,21 @@ void MeasureDatabase(const fs::path& folder, ImageId num_images, int num_repeats
   const Cost apply = MeasureFastest(num_repeats, remove_b, [&] { ApplyMasks(a, masks, b, {}); });
   const Cost again = MeasureFastest(
       num_repeats, [] {}, [&] { ApplyMasks(b, masks, "", {.in_place = true}); });
-  std::printf("%u images, %.0f keypoints, database %.0f MiB\n",
+  const auto apply_rule = [&](MaskRule rule) {
+    return MeasureFastest(num_repeats, remove_b, [&] { ApplyMasks(a, masks, b, {.rule = rule}); });
+  };
+  const Cost tracks = apply_rule(MaskRule::kTracks);
+  const Cost keypoints = apply_rule(MaskRule::kKeypoints);
+  const double applied_mib = static_cast<double>(fs::file_size(b)) / (1 << 20);
+  // Only the first run has something to restore.
+  const Cost restore = MeasureFastest(
+      1, [] {}, [&] { RestoreMasks(b, "", {.in_place = true}); });
+  std::printf("%u images, %.0f keypoints, %u neighbours, database %.0f MiB, %.0f by keypoints\n",
               num_images,
               num_keypoints,
-              static_cast<double>(fs::file_size(a)) / (1 << 20));
+              num_neighbours,
+              static_cast<double>(fs::file_size(a)) / (1 << 20),
+              applied_mib);
   const auto print = [&](const char* name, const Cost& cost) {
     std::printf(
         "  %-32s %7.2f s (cpu %6.2f s) %6.2f M keypoints/s, peak %4.0f MiB, %5.2f x .backup\n",
@@ -174,6 +190,9 @@ void MeasureDatabase(const fs::path& folder, ImageId num_images, int num_repeats
   print("decode masks, test keypoints", count);
   print("apply masks to a copy", apply);
   print("apply again in place (no change)", again);
+  print("apply, rule tracks", tracks);
+  print("apply, rule keypoints", keypoints);
+  print("restore that in place", restore);
   std::printf("  apply without decoding and testing: %.2f x cp+sync, %.2f x .backup\n",
               (apply.seconds - count.seconds) / cp_sync.seconds,
               (apply.seconds - count.seconds) / backup.seconds);
@@ -212,12 +231,13 @@ void MeasureFeatureImporter(const fs::path& folder, int num_images) {
 int Main(int argc, char** argv) {
   const auto num_images = static_cast<ImageId>(argc > 1 ? std::atoi(argv[1]) : 1000);
   const int num_repeats = argc > 2 ? std::atoi(argv[2]) : 3;
+  const auto num_neighbours = static_cast<ImageId>(argc > 3 ? std::atoi(argv[3]) : 10);
   std::string name = (fs::temp_directory_path() / "vgtw-benchmark-XXXXXX").string();
   if (::mkdtemp(name.data()) == nullptr) FailErrno(name, "cannot be made");
   int exit_code = 0;
   try {
-    MeasureDatabase(name, num_images / 4, num_repeats);
-    MeasureDatabase(name, num_images, num_repeats);
+    MeasureDatabase(name, num_images / 4, num_neighbours, num_repeats);
+    MeasureDatabase(name, num_images, num_neighbours, num_repeats);
     MeasureFeatureImporter(name, 20);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
