@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "network/aggregator.h"
 
-#include "network/model.h"
 #include "scene/error.h"
 
 #include <ATen/ATen.h>
@@ -41,9 +40,11 @@ Aggregator::Aggregator(const ParameterScope& scope, const VggtConfig& config)
   }
 }
 
-at::Tensor Aggregator::Embed(const at::Tensor& images) const {
+at::Tensor Aggregator::Embed(const at::Tensor& images,
+                             const std::function<void()>& on_block) const {
   const at::Tensor normalised = NormaliseImages(images);
-  const at::Tensor patches = encoder_ ? (*encoder_)(normalised) : (*patch_embedding_)(normalised);
+  const at::Tensor patches =
+      encoder_ ? (*encoder_)(normalised, on_block) : (*patch_embedding_)(normalised);
   const int64_t num_views = images.size(0);
   return at::cat({ForFirstAndOthers(camera_token_, num_views),
                   ForFirstAndOthers(registers_, num_views),
@@ -53,20 +54,22 @@ at::Tensor Aggregator::Embed(const at::Tensor& images) const {
 
 void Aggregator::operator()(const at::Tensor& images,
                             const OnLayer& on_layer,
-                            const at::Tensor& excluded_patches) const {
-  at::Tensor tokens = Embed(images);  // [S, T, E]
+                            const EncodeOptions& options) const {
+  at::Tensor tokens = Embed(images, options.on_block);  // [S, T, E]
   const RotaryTable rotary = MakeRotaryTable(kNumSpecialTokens,
                                              images.size(2) / kPatchSize,
                                              images.size(3) / kPatchSize,
                                              frame_blocks_.front().head_dim(),
                                              images.device());
-  const at::Tensor excluded = ExcludedTokens(excluded_patches);
+  const at::Tensor excluded = ExcludedTokens(options.excluded_patches);
   const at::Tensor excluded_anywhere = excluded.defined() ? excluded.view({1, -1}) : excluded;
   const int64_t dim = tokens.size(2);
   for (size_t i = 0; i < frame_blocks_.size(); ++i) {
     const at::Tensor frame = frame_blocks_[i](tokens, &rotary, excluded);
+    if (options.on_block) options.on_block();
     tokens =
         global_blocks_[i](frame.view({1, -1, dim}), &rotary, excluded_anywhere).view(frame.sizes());
+    if (options.on_block) options.on_block();
     on_layer(static_cast<int64_t>(i), at::cat({frame, tokens}, 2));
   }
 }

@@ -4,6 +4,7 @@
 
 #include "network/config.h"
 #include "network/layers.h"
+#include "network/model.h"
 #include "network/vision_transformer.h"
 
 #include <functional>
@@ -22,11 +23,10 @@ class Aggregator {
 
   // Gets layer i's tokens [S, 5 + P, 2 E] (frame block, then global block) as soon as they exist.
   using OnLayer = std::function<void(int64_t layer, const at::Tensor& tokens)>;
-  // images [S, 3, H, W] in [0, 1]. `excluded_patches` [S, P] or undefined: true = no token of the
-  // frame and global blocks attends to this patch.
+  // images [S, 3, H, W] in [0, 1].
   void operator()(const at::Tensor& images,
                   const OnLayer& on_layer,
-                  const at::Tensor& excluded_patches = {}) const;
+                  const EncodeOptions& options) const;
 
   const TransformerBlock& global_block(int64_t layer) const {
     return global_blocks_.at(static_cast<size_t>(layer));
@@ -34,7 +34,7 @@ class Aggregator {
   const std::optional<VisionTransformer>& encoder() const { return encoder_; }
 
  private:
-  at::Tensor Embed(const at::Tensor& images) const;
+  at::Tensor Embed(const at::Tensor& images, const std::function<void()>& on_block) const;
 
   std::optional<VisionTransformer> encoder_;
   std::optional<PatchEmbedding> patch_embedding_;

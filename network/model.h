@@ -28,6 +28,8 @@ struct Features {
 struct EncodeOptions {
   // [S, P] or undefined: true = no token of the trunk attends to this patch.
   at::Tensor excluded_patches = {};
+  // Called after every transformer block of the encoder and the trunk.
+  std::function<void()> on_block = {};
   // Sees the tokens [S, 5 + P, 2 E] of every layer, for tests and pictures.
   std::function<void(int64_t layer, const at::Tensor& tokens)> on_layer = {};
 };

@@ -112,8 +112,9 @@ RotaryTable Pi3::RotaryOf(const Features& features, int64_t head_dim) const {
                          registers_.device());
 }
 
-at::Tensor Pi3::EncodePatches(const at::Tensor& images) const {
-  return encoder_((images - image_mean_) / image_deviation_);
+at::Tensor Pi3::EncodePatches(const at::Tensor& images,
+                              const std::function<void()>& on_block) const {
+  return encoder_((images - image_mean_) / image_deviation_, on_block);
 }
 
 Features Pi3::Encode(const at::Tensor& images, const EncodeOptions& options) const {
@@ -122,15 +123,17 @@ Features Pi3::Encode(const at::Tensor& images, const EncodeOptions& options) con
   features.width = images.size(3);
   const int64_t num_views = images.size(0);
   const int64_t dim = config_.encoder.dim;
-  at::Tensor tokens =
-      at::cat({registers_[0].expand({num_views, -1, -1}), EncodePatches(images)}, 1);
+  at::Tensor tokens = at::cat(
+      {registers_[0].expand({num_views, -1, -1}), EncodePatches(images, options.on_block)}, 1);
   const at::Tensor excluded = ExcludedTokens(options.excluded_patches);
   const at::Tensor excluded_anywhere = excluded.defined() ? excluded.view({1, -1}) : excluded;
   const RotaryTable rotary = RotaryOf(features, dim / config_.encoder.num_heads);
   for (size_t i = 0; i + 1 < decoder_.size(); i += 2) {
     const at::Tensor frame = decoder_[i](tokens, &rotary, excluded);
+    if (options.on_block) options.on_block();
     tokens =
         decoder_[i + 1](frame.view({1, -1, dim}), &rotary, excluded_anywhere).view(frame.sizes());
+    if (options.on_block) options.on_block();
     const auto layer = static_cast<int64_t>(i / 2);
     features.last = at::cat({frame, tokens}, 2);
     for (size_t k = 0; distractor_head_ && k < config_.head_layers.size(); ++k) {

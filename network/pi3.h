@@ -8,6 +8,7 @@
 #include "network/model.h"
 #include "network/vision_transformer.h"
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -57,7 +58,8 @@ class Pi3 : public Model {
   const TransformerBlock& GlobalBlock(int64_t layer) const override;
 
   // What lies between, for tests: patches [S, P, E] of the encoder, tokens of the camera decoder.
-  at::Tensor EncodePatches(const at::Tensor& images) const;
+  at::Tensor EncodePatches(const at::Tensor& images,
+                           const std::function<void()>& on_block = {}) const;
   at::Tensor DecodeCameraTokens(const Features& features) const;
 
  private:

@@ -22,22 +22,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Work in units of one layer of the trunk on one view, by count of operations.
+// Work in units of one transformer block on one view.
 struct WorkUnits {
-  int64_t num_layers = 0;
-  int64_t encoder = 0;
   int64_t heads = 0;
-
-  int64_t OfView() const { return encoder + num_layers + heads; }
+  int64_t of_view = 0;
 };
 
-WorkUnits WorkUnitsOf(const NetworkDescription& description) {
-  constexpr int64_t kHeads = 12;
-  if (const auto* vggt = std::get_if<VggtConfig>(&description.config)) {
-    return {vggt->depth, vggt->encoder ? vggt->encoder->depth / 2 : 0, kHeads};
-  }
-  const auto& pi3 = std::get<Pi3Config>(description.config);
-  return {pi3.depth / 2, pi3.encoder.depth / 2, kHeads};
+WorkUnits WorkUnitsOf(const NetworkDescription& description, bool with_points) {
+  constexpr int64_t kDenseHead = 9;
+  const int64_t num_blocks = NumBlocks(description);
+  const bool is_vggt = std::holds_alternative<VggtConfig>(description.config);
+  const bool has_distractor_head =
+      std::visit([](const auto& sizes) { return sizes.has_distractor_head; }, description.config);
+  const int64_t num_heads = 1 + (with_points && is_vggt) + has_distractor_head;
+  return {kDenseHead * num_heads, num_blocks + kDenseHead * num_heads};
 }
 
 // The memory that a pass may take beside what the process holds already.
@@ -93,7 +91,7 @@ class PredictRun {
         progress_(progress),
         photos_(
             image_folder, image_names, LoaderOf(network.description, options), options.num_threads),
-        work_(WorkUnitsOf(network.description)) {}
+        work_(WorkUnitsOf(network.description, options.with_points)) {}
 
   PredictSummary Run() {
     summary_.network_width = photos_.network_width();
@@ -103,7 +101,7 @@ class PredictRun {
                                       : MaxViewsAtOnce(network_, options_.max_memory_gib, photos_);
     const std::vector<ViewChunk> chunks =
         PlanChunks(photos_.num_views(), num_views_at_once, options_.num_overlap_views);
-    for (const ViewChunk& chunk : chunks) total_ += (chunk.end - chunk.begin) * work_.OfView();
+    for (const ViewChunk& chunk : chunks) total_ += (chunk.end - chunk.begin) * work_.of_view;
     for (const ViewChunk& chunk : chunks) RunChunk(chunk, chunks.size() > 1);
     summary_.peak_memory_gib = static_cast<double>(PeakMemory()) / kGib;
     return std::move(summary_);
@@ -149,10 +147,9 @@ class PredictRun {
         encode.excluded_patches = encode.excluded_patches.index_select(0, indices);
       }
     }
-    int64_t pending = work_.encoder;
-    encode.on_layer = [&](int64_t, const at::Tensor&) {
+    encode.on_block = [&] {
       if (network_.release_memory) network_.release_memory();
-      Advance(num_views * (1 + std::exchange(pending, 0)));
+      Advance(num_views);
     };
     pass.features = network_.model->Encode(images, encode);
     pass.cameras = network_.model->PredictCameras(pass.features);
@@ -260,6 +257,14 @@ class PredictRun {
 };
 
 }  // namespace
+
+int64_t NumBlocks(const NetworkDescription& description) {
+  if (const auto* vggt = std::get_if<VggtConfig>(&description.config)) {
+    return (vggt->encoder ? vggt->encoder->depth : 0) + 2 * vggt->depth;
+  }
+  const auto& pi3 = std::get<Pi3Config>(description.config);
+  return pi3.encoder.depth + pi3.depth;
+}
 
 PreprocessOptions LoaderOf(const NetworkDescription& description, const PredictOptions& options) {
   PreprocessOptions loader;

@@ -23,9 +23,12 @@ struct ReadyNetwork {
   int64_t weights_bytes = 0;  // in the device's memory; 0 if the file's pages serve
   // [S, 3, H, W] in [0, 1] to one vector per view [S, E]; empty where no view is the reference.
   std::function<at::Tensor(const at::Tensor& images)> describe_views = {};
-  // Called after every layer.
+  // Called after every transformer block.
   std::function<void()> release_memory = {};
 };
+
+// Transformer blocks of encoder and trunk.
+int64_t NumBlocks(const NetworkDescription& description);
 
 // The official loader of a network.
 PreprocessOptions LoaderOf(const NetworkDescription& description, const PredictOptions& options);

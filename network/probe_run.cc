@@ -111,9 +111,10 @@ ProbeSummary ProbeViews(const ReadyNetwork& network,
 
   EncodeOptions encode;
   int64_t num_done = 0;
-  encode.on_layer = [&](int64_t, const at::Tensor&) {
+  const int64_t num_passes = excluded.defined() ? 2 : 1;
+  encode.on_block = [&] {
     if (network.release_memory) network.release_memory();
-    if (progress) progress(++num_done, (excluded.defined() ? 2 : 1) * num_layers);
+    if (progress) progress(++num_done, num_passes * NumBlocks(network.description));
   };
   ProbeSummary summary;
   summary.layers =

@@ -56,7 +56,7 @@ Features Vggt::Encode(const at::Tensor& images, const EncodeOptions& options) co
     if (layer == config_.depth - 1) features.last = tokens;
     if (options.on_layer) options.on_layer(layer, tokens);
   };
-  aggregator_(images, keep, options.excluded_patches);
+  aggregator_(images, keep, options);
   return features;
 }
 

@@ -67,7 +67,8 @@ VisionTransformer::VisionTransformer(const ParameterScope& scope, const EncoderC
   for (int64_t i = 0; i < config.depth; ++i) blocks_.emplace_back(scope["blocks"][i], block);
 }
 
-at::Tensor VisionTransformer::EncodeWithoutNorm(const at::Tensor& images) const {
+at::Tensor VisionTransformer::EncodeWithoutNorm(const at::Tensor& images,
+                                                const std::function<void()>& on_block) const {
   VGTW_CHECK(images.size(2) % kPatchSize == 0 && images.size(3) % kPatchSize == 0,
              "image size in patches");
   const int64_t num_views = images.size(0);
@@ -78,12 +79,16 @@ at::Tensor VisionTransformer::EncodeWithoutNorm(const at::Tensor& images) const 
   // Registers have no position.
   tokens =
       at::cat({tokens.slice(1, 0, 1), ForEachView(registers_, num_views), tokens.slice(1, 1)}, 1);
-  for (const TransformerBlock& block : blocks_) tokens = block(tokens);
+  for (const TransformerBlock& block : blocks_) {
+    tokens = block(tokens);
+    if (on_block) on_block();
+  }
   return tokens;
 }
 
-at::Tensor VisionTransformer::operator()(const at::Tensor& images) const {
-  return norm_(EncodeWithoutNorm(images)).slice(1, kNumSpecialTokens);
+at::Tensor VisionTransformer::operator()(const at::Tensor& images,
+                                         const std::function<void()>& on_block) const {
+  return norm_(EncodeWithoutNorm(images, on_block)).slice(1, kNumSpecialTokens);
 }
 
 }  // namespace vgtw

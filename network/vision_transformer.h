@@ -6,6 +6,7 @@
 #include "network/layers.h"
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <ATen/core/Tensor.h>
@@ -40,9 +41,11 @@ class VisionTransformer {
  public:
   VisionTransformer(const ParameterScope& scope, const EncoderConfig& config);
   // Tokens [S, 5 + P, E] after the last block, not yet normalised: class, registers, patches.
-  at::Tensor EncodeWithoutNorm(const at::Tensor& normalised_images) const;
+  at::Tensor EncodeWithoutNorm(const at::Tensor& normalised_images,
+                               const std::function<void()>& on_block = {}) const;
   // Patch tokens [S, P, E].
-  at::Tensor operator()(const at::Tensor& normalised_images) const;
+  at::Tensor operator()(const at::Tensor& normalised_images,
+                        const std::function<void()>& on_block = {}) const;
 
  private:
   PatchEmbedding patch_embedding_;

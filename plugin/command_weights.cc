@@ -233,12 +233,11 @@ struct CheckCommand {
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     const std::string kind(NetworkKindName(description.kind));
     const double peak_gib = static_cast<double>(PeakMemory()) / kGib;
-    Finish(
-        usability,
-        "OK: all weights of " + kind + ", all finite, loaded in " +
-            FormatNumber(seconds.count(), 1) + " s with " + FormatNumber(peak_gib, 2) +
-            " GiB of memory\n",
-        {{"network", kind}, {"load_sec", seconds.count()}, {"peak_memory_gib", peak_gib}});
+    Finish(usability,
+           "OK: all weights of " + kind + ", all finite, loaded in " +
+               FormatNumber(seconds.count(), 1) + " s with " + FormatNumber(peak_gib, 2) +
+               " GiB of memory\n",
+           {{"network", kind}, {"load_sec", seconds.count()}, {"peak_memory_gib", peak_gib}});
   }
 
  private:

@@ -44,6 +44,7 @@ fs::path FindNetworkProgram() {
 
 void PrepareNetworkEnvironment() {
   if (WantsSkylakeKernels()) ::setenv("OPENBLAS_CORETYPE", "SKYLAKEX", /*overwrite=*/0);
+  ::setenv("OMP_WAIT_POLICY", "passive", /*overwrite=*/0);
 }
 
 void BecomeNetworkProgram(int argc, char** argv) {

@@ -23,7 +23,10 @@ inline constexpr std::string_view kWeightsConvertSummary =
 std::filesystem::path FindNetworkProgram();
 
 // Sets what LibTorch and its BLAS read from the environment when a process starts, unless the user
-// has set it: OPENBLAS_CORETYPE, where OpenBLAS may take the processor for an older one.
+// has set it:
+//   OPENBLAS_CORETYPE  where OpenBLAS may take the processor for an older one
+//   OMP_WAIT_POLICY    passive: threads that wait for each other otherwise spin, which where other
+//                      programs want the cores, too, makes the network several times slower
 void PrepareNetworkEnvironment();
 
 // Becomes the network's program with the same arguments, so that output, progress and exit code are

@@ -14,7 +14,9 @@ namespace vgtw {
 namespace {
 
 constexpr Rgb kQuery = {230, 30, 40};
+constexpr Rgb kQueryRim = {255, 255, 255};
 constexpr double kQueryRadiusPx = 4.0;
+constexpr double kQueryRimPx = 2.0;
 
 // Even steps of lightness, so that the order of values shows in gray too.
 constexpr std::array<Rgb, 5> kRamp = {
@@ -79,7 +81,9 @@ RgbImage MakeProbeSheet(const std::vector<ProbePhoto>& photos,
     const double original_px_per_tile_px = double(photo.photo.width()) / tile_width;
     RgbImage marked = tile;
     if (view == query.view) {
-      DrawDisc(query.pixel_in_original / original_px_per_tile_px, kQueryRadiusPx, kQuery, marked);
+      const Eigen::Vector2d centre = query.pixel_in_original / original_px_per_tile_px;
+      DrawDisc(centre, kQueryRadiusPx + kQueryRimPx, kQueryRim, marked);
+      DrawDisc(centre, kQueryRadiusPx, kQuery, marked);
     }
     std::vector<Tile>& row = rows.emplace_back();
     row.push_back({photo.name, std::move(marked)});

@@ -69,7 +69,7 @@ class TrueModel : public Model {
     features.last = (images.select(1, 0).select(1, 0).select(1, 0) * 25.5).round().view({-1, 1, 1});
     pass_sizes.push_back(features.num_views());
     excluded_patches = options.excluded_patches;
-    if (options.on_layer) options.on_layer(0, features.last);
+    for (int block = 0; block < 2 && options.on_block; ++block) options.on_block();
     return features;
   }
 

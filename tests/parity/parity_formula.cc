@@ -3,10 +3,10 @@
 
 #include <cmath>
 #include <fstream>
-#include <sstream>
 #include <functional>
 #include <map>
 #include <numeric>
+#include <sstream>
 
 namespace vgtw {
 namespace {

@@ -97,5 +97,15 @@ TEST_F(NetworkProgramTest, KeepsWhatTheUserSetInTheEnvironment) {
   ::unsetenv("OPENBLAS_CORETYPE");
 }
 
+TEST_F(NetworkProgramTest, WaitsWithoutSpinningUnlessTheUserWantsIt) {
+  ::unsetenv("OMP_WAIT_POLICY");
+  PrepareNetworkEnvironment();
+  EXPECT_STREQ(std::getenv("OMP_WAIT_POLICY"), "passive");
+  ::setenv("OMP_WAIT_POLICY", "active", 1);
+  PrepareNetworkEnvironment();
+  EXPECT_STREQ(std::getenv("OMP_WAIT_POLICY"), "active");
+  ::unsetenv("OMP_WAIT_POLICY");
+}
+
 }  // namespace
 }  // namespace vgtw
