@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene/exif_focal_length.h"
+#include "scene/exif_orientation.h"
 #include "scene/image_header.h"
 #include "tests/fuzz/fuzzing.h"
 
@@ -11,5 +12,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     IsTruncated(file);
     const auto focal_length = ParseExifFocalLength(FindExif(file), {640, 480});
     Require(!focal_length || *focal_length > 0.0);
+    const int orientation = ParseExifOrientation(FindExif(file));
+    Require(orientation >= 1 && orientation <= 8);
+    ParsePngFormat(file);
   });
 }
