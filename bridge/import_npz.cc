@@ -175,7 +175,8 @@ void ReadStack(const ImportJob& job, const ViewSink& sink, ImportSummary& summar
     import.Resolve(photo_indices, std::vector<MapSize>(job.photos.size(), *views.map_size()));
   }
   for (size_t i = 0; i < views.num_views(); ++i) {
-    const auto geometry_idx = views.map_size() ? std::optional<size_t>(i) : std::nullopt;
+    std::optional<size_t> geometry_idx;
+    if (views.map_size()) geometry_idx = i;
     import.Add(job.input_path, i, geometry_idx, views.Next());
   }
   import.NoteMask(views);
