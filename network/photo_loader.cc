@@ -76,7 +76,8 @@ at::Tensor PhotoLoader::LoadExcluded(int begin,
                   "x" + std::to_string(static_mask.height()) + " pixels, expected the photo's " +
                   std::to_string(size.width) + "x" + std::to_string(size.height));
     }
-    excluded[i].copy_(IsExcluded(MakeNetworkMask(static_mask, placement(view), /*outside=*/255)));
+    excluded[i].copy_(
+        IsExcluded(MakeNetworkMask(static_mask, placement(view), options_, /*outside=*/255)));
   });
   return excluded;
 }

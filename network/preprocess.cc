@@ -82,27 +82,52 @@ RgbImage PadToSquare(const RgbImage& photo) {
   return square;
 }
 
-// The input of a loader that resizes first: the resized photo is drawn where the map says.
+// How a loader that resizes first fills the input.
+struct ResizedPhoto {
+  int width = 0;
+  int height = 0;
+  int first_row = 0;  // that is kept
+  int num_rows = 0;
+};
+
+ResizedPhoto ResizedPhotoOf(const PhotoPlacement& placement) {
+  const PixelMap& original_from_network = placement.geometry.original_from_network;
+  const auto in_network = [](double original, double scale) {
+    return static_cast<int>(std::lround(original / scale));
+  };
+  const double scale_y = original_from_network(1, 1);
+  return {in_network(static_cast<double>(placement.photo_size.width), original_from_network(0, 0)),
+          in_network(static_cast<double>(placement.photo_size.height), scale_y),
+          std::max(0, in_network(original_from_network(1, 2), scale_y)),
+          placement.end_row - placement.first_row};
+}
+
+// The resized photo is drawn where the map says.
 RgbImage DrawResized(const RgbImage& photo,
                      const PhotoPlacement& placement,
                      PilResizeOptions options) {
-  const auto& [network_width, network_height, original_from_network] = placement.geometry;
-  const int resized_width =
-      static_cast<int>(std::lround(photo.width() / original_from_network(0, 0)));
-  const int resized_height =
-      static_cast<int>(std::lround(photo.height() / original_from_network(1, 1)));
-  const auto cropped_row =
-      static_cast<int>(std::lround(original_from_network(1, 2) / original_from_network(1, 1)));
-  options.first_row = std::max(0, cropped_row);
-  options.num_rows = placement.end_row - placement.first_row;
-  const RgbImage resized = PilResize(photo, resized_width, resized_height, options);
-
-  RgbImage canvas(network_width, network_height, kWhite);
-  for (int y = 0; y < resized.height(); ++y) {
+  const ResizedPhoto resized = ResizedPhotoOf(placement);
+  options.first_row = resized.first_row;
+  options.num_rows = resized.num_rows;
+  const RgbImage rows = PilResize(photo, resized.width, resized.height, options);
+  RgbImage canvas(placement.geometry.network_width, placement.geometry.network_height, kWhite);
+  for (int y = 0; y < rows.height(); ++y) {
     std::copy_n(
-        &resized(0, y), resized.width(), &canvas(placement.first_column, placement.first_row + y));
+        &rows(0, y), rows.width(), &canvas(placement.first_column, placement.first_row + y));
   }
   return canvas;
+}
+
+// The pixel that is taken for each of `new_size` pixels. Added up as Pillow does, whose rounding
+// decides where a centre falls on the edge between two pixels.
+std::vector<int> NearestNeighbours(int old_size, int new_size) {
+  const double step = static_cast<double>(old_size) / new_size;
+  std::vector<int> neighbours;
+  for (double position = 0.5 * step; neighbours.size() < static_cast<size_t>(new_size);
+       position += step) {
+    neighbours.push_back(std::min(static_cast<int>(position), old_size - 1));
+  }
+  return neighbours;
 }
 
 }  // namespace
@@ -165,21 +190,22 @@ RgbImage MakeNetworkImage(const RgbImage& photo,
 
 StaticMask MakeNetworkMask(const StaticMask& photo_mask,
                            const PhotoPlacement& placement,
+                           const PreprocessOptions& options,
                            uint8_t outside) {
-  const NetworkGeometry& geometry = placement.geometry;
+  VGTW_CHECK(options.policy != ResizePolicy::kSquarePad, "no mask for kSquarePad");
   VGTW_CHECK(photo_mask.width() == static_cast<int>(placement.photo_size.width) &&
                  photo_mask.height() == static_cast<int>(placement.photo_size.height),
              "mask is not of its photo's size");
+  const ResizedPhoto resized = ResizedPhotoOf(placement);
+  const std::vector<int> columns = NearestNeighbours(photo_mask.width(), resized.width);
+  const std::vector<int> rows = NearestNeighbours(photo_mask.height(), resized.height);
+  const NetworkGeometry& geometry = placement.geometry;
   StaticMask mask(geometry.network_width, geometry.network_height, outside);
-  for (int y = placement.first_row; y < placement.end_row; ++y) {
-    for (int x = placement.first_column; x < placement.end_column; ++x) {
-      // Where a centre falls on an edge between two pixels, rounding must not choose.
-      constexpr double kTowardsNext = 1e-9;
-      const Eigen::Vector2d pixel =
-          Apply(geometry.original_from_network, Eigen::Vector2d(x + 0.5, y + 0.5));
-      mask(x, y) =
-          photo_mask(std::min(static_cast<int>(pixel.x() + kTowardsNext), photo_mask.width() - 1),
-                     std::min(static_cast<int>(pixel.y() + kTowardsNext), photo_mask.height() - 1));
+  for (int y = 0; y < resized.num_rows; ++y) {
+    const int photo_y = rows[static_cast<size_t>(resized.first_row + y)];
+    for (int x = 0; x < resized.width; ++x) {
+      mask(placement.first_column + x, placement.first_row + y) =
+          photo_mask(columns[static_cast<size_t>(x)], photo_y);
     }
   }
   return mask;

@@ -55,11 +55,12 @@ RgbImage MakeNetworkImage(const RgbImage& photo,
                           const PreprocessOptions& options,
                           int num_threads = 1);
 
-// A photo's mask as the network's image shows it: the mask's value under the centre of each pixel,
-// which is the official loader's nearest neighbour, and `outside` on bars. Throws
-// std::invalid_argument if the mask has not the size of the photo that was placed.
+// A photo's mask as the network's image shows it, resized to the nearest neighbour as the official
+// loader of masks does, and `outside` on bars. Not for kSquarePad. Throws std::invalid_argument if
+// the mask has not the size of the photo that was placed.
 StaticMask MakeNetworkMask(const StaticMask& photo_mask,
                            const PhotoPlacement& placement,
+                           const PreprocessOptions& options,
                            uint8_t outside);
 
 }  // namespace vgtw

@@ -92,16 +92,36 @@ TEST(NetworkMask, IsThatOfTheOfficialLoader) {
     photo_mask.data()[i] = photo.data()[i][0] > 127 ? 255 : 0;
   }
   const StaticMask mask =
-      MakeNetworkMask(photo_mask, PlacePhotos({{200, 133}}, kCrop).front(), /*outside=*/0);
+      MakeNetworkMask(photo_mask, PlacePhotos({{200, 133}}, kCrop).front(), kCrop, /*outside=*/0);
   const SafetensorsFile file(ParityData() / "preprocess.safetensors");
   const StoredTensor& official = file.tensors().at("mask.land");
   ASSERT_EQ(official.bytes.size(), mask.size());
   EXPECT_EQ(std::memcmp(official.bytes.data(), mask.data().data(), mask.size()), 0);
 }
 
+// A landscape of 56 x 28 becomes 28 x 14 pixels between bars of 7 rows.
+TEST(NetworkMask, IsCroppedAndPaddedAsThePhoto) {
+  PreprocessOptions options = kPad;
+  options.side_px = 28;
+  const auto placements = PlacePhotos({{56, 28}}, options);
+  StaticMask upper_half(56, 28, 255);
+  for (int y = 0; y < 14; ++y) {
+    for (int x = 0; x < 56; ++x) upper_half(x, y) = 0;
+  }
+  const StaticMask mask = MakeNetworkMask(upper_half, placements[0], options, /*outside=*/9);
+  ASSERT_EQ(mask.height(), 28);
+  EXPECT_EQ(mask(3, 6), 9);
+  EXPECT_EQ(mask(3, 7), 0);
+  EXPECT_EQ(mask(3, 13), 0);
+  EXPECT_EQ(mask(3, 14), 255);
+  EXPECT_EQ(mask(3, 20), 255);
+  EXPECT_EQ(mask(3, 21), 9);
+}
+
 TEST(NetworkMask, RefusesAMaskOfAnotherSize) {
   const auto placements = PlacePhotos({{200, 133}}, kCrop);
-  EXPECT_THROW(MakeNetworkMask(StaticMask(100, 133, 0), placements[0], 0), std::invalid_argument);
+  EXPECT_THROW(MakeNetworkMask(StaticMask(100, 133, 0), placements[0], kCrop, 0),
+               std::invalid_argument);
 }
 
 // The corners that VGGT's loader reports beside its squares, in float32.

@@ -33,8 +33,9 @@ TEST(TileSheet, ACaptionEndsWithItsPicture) {
   bool has_ink = false;
   for (int y = 0; y < 32; ++y) {
     for (int x = 0; x < sheet.width(); ++x) {
-      if (x >= 48) EXPECT_EQ(sheet(x, y), kWhite);
-      has_ink = has_ink || sheet(x, y) != kWhite;
+      const bool is_ink = sheet(x, y) != kWhite;
+      EXPECT_FALSE(is_ink && x >= 48);
+      has_ink = has_ink || is_ink;
     }
   }
   EXPECT_TRUE(has_ink);
