@@ -44,7 +44,9 @@ fs::path FindNetworkProgram() {
 
 void PrepareNetworkEnvironment() {
   if (WantsSkylakeKernels()) ::setenv("OPENBLAS_CORETYPE", "SKYLAKEX", /*overwrite=*/0);
-  ::setenv("OMP_WAIT_POLICY", "passive", /*overwrite=*/0);
+  if (std::getenv("OMP_WAIT_POLICY") == nullptr) {
+    ::setenv("GOMP_SPINCOUNT", "20000", /*overwrite=*/0);
+  }
 }
 
 void BecomeNetworkProgram(int argc, char** argv) {

@@ -25,8 +25,10 @@ std::filesystem::path FindNetworkProgram();
 // Sets what LibTorch and its BLAS read from the environment when a process starts, unless the user
 // has set it:
 //   OPENBLAS_CORETYPE  where OpenBLAS may take the processor for an older one
-//   OMP_WAIT_POLICY    passive: threads that wait for each other otherwise spin, which where other
-//                      programs want the cores, too, makes the network several times slower
+//   GOMP_SPINCOUNT     threads that wait for each other spin first; for as long as GCC's OpenMP
+//   lets
+//                      them, the network gets several times slower where other programs want the
+//                      cores, too. Not if OMP_WAIT_POLICY says what the user wants
 void PrepareNetworkEnvironment();
 
 // Becomes the network's program with the same arguments, so that output, progress and exit code are

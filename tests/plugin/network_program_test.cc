@@ -97,14 +97,18 @@ TEST_F(NetworkProgramTest, KeepsWhatTheUserSetInTheEnvironment) {
   ::unsetenv("OPENBLAS_CORETYPE");
 }
 
-TEST_F(NetworkProgramTest, WaitsWithoutSpinningUnlessTheUserWantsIt) {
-  ::unsetenv("OMP_WAIT_POLICY");
-  PrepareNetworkEnvironment();
-  EXPECT_STREQ(std::getenv("OMP_WAIT_POLICY"), "passive");
+TEST_F(NetworkProgramTest, ThreadsSpinShortlyUnlessTheUserSaysHow) {
   ::setenv("OMP_WAIT_POLICY", "active", 1);
+  ::unsetenv("GOMP_SPINCOUNT");
   PrepareNetworkEnvironment();
-  EXPECT_STREQ(std::getenv("OMP_WAIT_POLICY"), "active");
+  EXPECT_EQ(std::getenv("GOMP_SPINCOUNT"), nullptr);
   ::unsetenv("OMP_WAIT_POLICY");
+  PrepareNetworkEnvironment();
+  EXPECT_STREQ(std::getenv("GOMP_SPINCOUNT"), "20000");
+  ::setenv("GOMP_SPINCOUNT", "7", 1);
+  PrepareNetworkEnvironment();
+  EXPECT_STREQ(std::getenv("GOMP_SPINCOUNT"), "7");
+  ::unsetenv("GOMP_SPINCOUNT");
 }
 
 }  // namespace
