@@ -60,7 +60,12 @@ at::Tensor Convolution::operator()(const at::Tensor& x) const {
 Upsampling::Upsampling(const ParameterScope& scope, int64_t num_channels, int64_t stride)
     : weight_(scope.GetForProduct("weight", {num_channels, num_channels, stride, stride})),
       bias_(scope.GetForProduct("bias", {num_channels})),
-      stride_(stride) {}
+      stride_(stride) {
+  // On CPUs LibTorch 1.13 has no such product of 16 bits, or a wrong one.
+  if (!weight_.is_cpu()) return;
+  weight_ = AtLeastFloat(weight_);
+  bias_ = AtLeastFloat(bias_);
+}
 
 at::Tensor Upsampling::operator()(const at::Tensor& x) const {
   return at::conv_transpose2d(x.to(weight_.scalar_type()), weight_, bias_, stride_);
