@@ -53,23 +53,12 @@ std::vector<MaskedImage> ReadImages(SqliteConnection& connection) {
 }
 
 void FindMasks(const fs::path& mask_folder, bool allow_missing, std::vector<MaskedImage>& images) {
-  if (!fs::is_directory(mask_folder)) {
-    Fail(mask_folder, "is not a folder", "masks named <image name>.png");
-  }
-  fs::path first_missing;
-  size_t num_missing = 0;
+  std::vector<std::string> names;
+  for (const MaskedImage& image : images) names.push_back(image.summary.image_name);
+  CheckMasksExist(mask_folder, names, allow_missing);
   for (MaskedImage& image : images) {
-    const fs::path path = MaskPath(mask_folder, image.summary.image_name);
-    image.summary.has_mask = fs::exists(path);
-    if (image.summary.has_mask) continue;
-    if (num_missing++ == 0) first_missing = path;
+    image.summary.has_mask = fs::exists(MaskPath(mask_folder, image.summary.image_name));
   }
-  if (num_missing == 0 || allow_missing) return;
-  Fail(first_missing,
-       "is missing (" + std::to_string(num_missing) + " of " + std::to_string(images.size()) +
-           " images have no mask)",
-       "one mask per image",
-       "write all-white ones, or allow missing masks");
 }
 
 // COLMAP's scale of a keypoint: what its columns after x and y say.

@@ -62,24 +62,23 @@ PixelMap MaskFromPhoto(const MaskConvention& convention,
                        const fs::path& path,
                        const ImageSize& mask,
                        const ImageSize& photo) {
-  if (mask == photo) return IdentityPixelMap();
-  if (convention.size == MaskSize::kDust3r) {
+  const bool differs = mask != photo;
+  if (differs && convention.size == MaskSize::kDust3r) {
     if (const auto map = Dust3rFromPhoto(photo, mask)) return *map;
   }
-  if (convention.size == MaskSize::kScaled && IsScaled(mask, photo)) {
+  if (differs && convention.size == MaskSize::kScaled && IsScaled(mask, photo)) {
     return ScaleMap(static_cast<double>(mask.width) / static_cast<double>(photo.width),
                     static_cast<double>(mask.height) / static_cast<double>(photo.height));
   }
-  const auto text = [](const ImageSize& size) {
-    return std::to_string(size.width) + " x " + std::to_string(size.height) + " pixels";
-  };
-  Fail(path,
-       "has " + text(mask),
-       text(photo) + ", the size of its photo" +
-           (convention.frame == MaskFrame::kUpright ? " upright" : ""),
-       std::string(convention.tool) + (convention.size == MaskSize::kPhoto
-                                           ? " does not resize masks"
-                                           : " would not make such a mask of this photo"));
+  CheckSize(path,
+            mask,
+            photo,
+            convention.frame == MaskFrame::kUpright ? "the size of its photo upright"
+                                                    : "the size of its photo",
+            std::string(convention.tool) + (convention.size == MaskSize::kPhoto
+                                                ? " does not resize masks"
+                                                : " would not make such a mask of this photo"));
+  return IdentityPixelMap();
 }
 
 int OrientationFor(const MaskConvention& convention, const fs::path& photo_path) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/mask_files.h"
 
+#include "bridge/mask_resample.h"
 #include "scene/error.h"
 #include "scene/files.h"
 #include "scene/image_io.h"
@@ -34,12 +35,11 @@ void CheckSize(const std::filesystem::path& path,
 
 StaticMask ReadMaskOfSize(const std::filesystem::path& path, const ImageSize& size) {
   StaticMask static_mask = ReadStaticMask(path);
-  CheckSize(
-      path,
-      {static_cast<uint64_t>(static_mask.width()), static_cast<uint64_t>(static_mask.height())},
-      size,
-      "the size of its image",
-      "write masks at full size: COLMAP does not resize them");
+  CheckSize(path,
+            SizeOf(static_mask),
+            size,
+            "the size of its image",
+            "write masks at full size: COLMAP does not resize them");
   return static_mask;
 }
 
