@@ -2,6 +2,7 @@
 #pragma once
 
 #include "scene/camera.h"
+#include "scene/features.h"
 #include "scene/reconstruction.h"
 #include "scene/rigid3d.h"
 
@@ -23,42 +24,6 @@ struct DatabaseImage {
   ImageId image_id = 0;
   std::string name;
   CameraId camera_id = 0;
-};
-
-// float32 [rows, cols], cols 2 (x y), 4 (x y scale orientation_rad) or 6 (x y a11 a12 a21 a22);
-// x, y in original pixels, first centre (0.5, 0.5).
-struct Keypoints {
-  uint32_t rows = 0;
-  uint32_t cols = 0;
-  std::vector<float> data;
-
-  float x(size_t row) const { return data[row * cols]; }
-  float y(size_t row) const { return data[row * cols + 1]; }
-};
-
-// Bytes [rows, cols]; cols is bytes per row (128 for SIFT). type: COLMAP 4's, 0 = SIFT.
-struct Descriptors {
-  uint32_t rows = 0;
-  uint32_t cols = 0;
-  int type = 0;
-  std::vector<uint8_t> data;
-};
-
-// (point2D_idx in image 1, point2D_idx in image 2); image 1 is the one that was named first.
-using FeatureMatches = std::vector<std::array<uint32_t, 2>>;
-
-// How image 2 relates to image 1:  x2^T F x1 = 0,  x2 ~ H x1  (pixels), E likewise for rays.
-// config: 0 undefined, 1 degenerate, 2 calibrated, 3 uncalibrated, 4 planar, 5 panoramic,
-// 6 planar or panoramic, 7 watermark, 8 multiple, 9 calibrated rig (>= 3.12).
-// What is not set is stored as that version does: NULL from 4.0 on, before it zero matrices and an
-// identity pose, which therefore also read as not set, as do non-finite values.
-struct TwoViewGeometry {
-  int config = 0;
-  FeatureMatches inlier_matches = {};
-  std::optional<Eigen::Matrix3d> F = {};
-  std::optional<Eigen::Matrix3d> E = {};
-  std::optional<Eigen::Matrix3d> H = {};
-  std::optional<Rigid3d> cam2_from_cam1 = {};
 };
 
 struct PosePrior {
@@ -136,6 +101,8 @@ class ColmapDatabase {
   void WriteKeypoints(ImageId image_id, const Keypoints& keypoints);
   void WriteDescriptors(ImageId image_id, const Descriptors& descriptors);
   void WriteMatches(ImageId image_id1, ImageId image_id2, const FeatureMatches& matches);
+  // What is not set is stored as that version does: NULL from 4.0 on, before it zero matrices and
+  // an identity pose, which therefore also read as not set, as do non-finite values.
   void WriteTwoViewGeometry(ImageId image_id1, ImageId image_id2, const TwoViewGeometry& geometry);
   void ClearMatches();  // all rows of matches and two-view geometries
   // The covariance is left out where 3.10 has no column for it. Throws Error without the table.

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/seed_points.h"
 
-#include "bridge/confidence_histogram.h"
 #include "bridge/point_cloud.h"
-#include "bridge/static_view.h"
 #include "bridge/voxel_grid.h"
+#include "scene/confidence_histogram.h"
 #include "scene/error.h"
 #include "scene/image_io.h"
 #include "scene/parallel.h"
+#include "scene/static_view.h"
 #include "scene/statistics.h"
 
 #include <algorithm>

@@ -3,8 +3,8 @@
 
 #include "scene/error.h"
 #include "scene/files.h"
-#include "tests/bridge/wall_prediction.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/wall_prediction.h"
 
 #include <limits>
 #include <stdexcept>

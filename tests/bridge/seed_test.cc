@@ -5,8 +5,8 @@
 #include "scene/image_io.h"
 #include "scene/reprojection.h"
 #include "scene/synthetic.h"
-#include "tests/bridge/wall_prediction.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/wall_prediction.h"
 
 #include <algorithm>
 #include <cmath>

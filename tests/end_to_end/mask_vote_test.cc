@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/mask_files.h"
 #include "bridge/predictions.h"
-#include "tests/bridge/wall_prediction.h"
 #include "tests/end_to_end/run_vgtw.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/wall_prediction.h"
 
 #include <algorithm>
 

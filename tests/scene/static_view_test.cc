@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bridge/static_view.h"
+#include "scene/static_view.h"
 
-#include "tests/bridge/wall_prediction.h"
+#include "tests/support/wall_prediction.h"
 
 #include <cmath>
 #include <limits>
@@ -106,6 +106,35 @@ TEST(StaticView, SamplesGivePointsAndAgreeNearby) {
   prediction.distractor = DistractorMask(32, 24, 0.0f);
   prediction.distractor(22, 15) = 0.9f;
   EXPECT_EQ(StaticView(prediction, kThreshold).StaticPoints(0.0).size(), 1u);
+}
+
+TEST(StaticView, DepthIsThatOfTheMapOnStaticPixels) {
+  ViewPrediction prediction = MakeWallView("a.png", 0.0);
+  prediction.depth(4, 4) = 6.0f;  // a depth edge for its neighbours
+  prediction.depth_conf = ConfidenceMap(32, 24, 3.0f);
+  prediction.depth_conf(20, 10) = 7.0f;
+  prediction.distractor = DistractorMask(32, 24, 0.1f);
+  prediction.distractor(10, 10) = 0.9f;
+  const StaticView view(prediction, kThreshold);
+  const auto depth = view.DepthAt({41.0, 21.0});  // network (20.5, 10.5)
+  ASSERT_TRUE(depth);
+  EXPECT_FLOAT_EQ(depth->depth, 5.1f);
+  EXPECT_EQ(depth->confidence, 7.0f);
+  EXPECT_FALSE(view.DepthAt({21.0, 21.0}));  // on the distractor
+  EXPECT_FALSE(view.DepthAt({8.0, 8.0}));    // on the edge
+  EXPECT_FALSE(view.DepthAt({-1.0, 8.0}));
+}
+
+TEST(StaticView, DepthIsThatOfTheNearestSample) {
+  ViewPrediction prediction = MakeWallView("a.png", 0.0);
+  prediction.depth = {};
+  prediction.depth_samples = {{{10.0f, 10.0f}, 2.0f, 1.5f}, {{10.6f, 10.0f}, 3.0f, 2.5f}};
+  const StaticView view(prediction, kThreshold);
+  ASSERT_TRUE(view.DepthAt({10.2, 10.0}));
+  EXPECT_EQ(view.DepthAt({10.2, 10.0})->depth, 2.0f);
+  EXPECT_EQ(view.DepthAt({10.4, 10.0})->depth, 3.0f);
+  EXPECT_EQ(view.DepthAt({10.4, 10.0})->confidence, 2.5f);
+  EXPECT_FALSE(view.DepthAt({14.0, 10.0}));  // farther than 1 % of 64 px
 }
 
 }  // namespace

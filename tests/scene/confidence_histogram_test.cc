@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bridge/confidence_histogram.h"
+#include "scene/confidence_histogram.h"
 
 #include <algorithm>
 #include <cmath>

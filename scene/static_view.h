@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "bridge/confidence_histogram.h"
+#include "scene/confidence_histogram.h"
 #include "scene/grid.h"
 #include "scene/prediction.h"
 
@@ -25,11 +25,18 @@ class StaticView {
   // mask all are.
   StaticView(ViewPrediction prediction, double distractor_threshold);
 
+  const View& view() const { return prediction_.view; }
+
   // Adds the confidence of every known depth, static or not.
   void AddConfidencesTo(ConfidenceHistogram& histogram) const;
 
   // The static depths whose confidence, where given, reaches the threshold.
   std::vector<Point> StaticPoints(double confidence_threshold) const;
+
+  // What was measured at a static pixel of the photo: bilinear in the map (see SampleDepth) with
+  // the confidence of the pixel, else the nearest sample within about 1 % of the image; nullopt if
+  // nothing is known there. Confidence is 1 where none is given.
+  std::optional<DepthSample> DepthAt(const Eigen::Vector2d& pixel_in_original) const;
 
   // Where the view sees a point of the world, in original pixels: in front, inside the image, on a
   // static pixel, and at the depth measured there up to the relative difference. Samples count
@@ -41,15 +48,15 @@ class StaticView {
   void BinSamples();
   bool IsStatic(const Eigen::Vector2d& pixel_in_original) const;
   Eigen::Array2i BinOf(const Eigen::Vector2d& pixel_in_original) const;
-  bool SampleAgrees(const Eigen::Vector2d& pixel_in_original,
-                    double depth,
-                    double max_relative_depth_difference) const;
+  // Calls visit(sample) for the samples around a pixel until it returns true; whether one did.
+  template <typename Visit>
+  bool AnySampleAround(const Eigen::Vector2d& pixel_in_original, const Visit& visit) const;
 
   ViewPrediction prediction_;
   double distractor_threshold_ = 0.5;
   PixelMap network_from_original_;
   double bin_edge_px_ = 1.0;
-  Grid<std::vector<float>> depths_by_bin_;  // of the samples on static pixels
+  Grid<std::vector<DepthSample>> samples_by_bin_;  // those on static pixels
 };
 
 }  // namespace vgtw

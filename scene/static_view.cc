@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bridge/static_view.h"
+#include "scene/static_view.h"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace vgtw {
@@ -30,14 +31,14 @@ StaticView::StaticView(ViewPrediction prediction, double distractor_threshold)
 void StaticView::BinSamples() {
   const Camera& camera = prediction_.view.camera;
   bin_edge_px_ = static_cast<double>(std::max(camera.width, camera.height)) / kNumSampleBins;
-  depths_by_bin_ = Grid<std::vector<float>>(
+  samples_by_bin_ = Grid<std::vector<DepthSample>>(
       static_cast<int>(std::ceil(static_cast<double>(camera.width) / bin_edge_px_)),
       static_cast<int>(std::ceil(static_cast<double>(camera.height) / bin_edge_px_)));
   for (const DepthSample& sample : prediction_.depth_samples) {
     const Eigen::Vector2d pixel = sample.pixel_in_original.cast<double>();
     const Eigen::Array2i bin = BinOf(pixel);
-    if (!depths_by_bin_.Contains(bin.x(), bin.y()) || !IsStatic(pixel)) continue;
-    depths_by_bin_(bin.x(), bin.y()).push_back(sample.depth);
+    if (!samples_by_bin_.Contains(bin.x(), bin.y()) || !IsStatic(pixel)) continue;
+    samples_by_bin_(bin.x(), bin.y()).push_back(sample);
   }
 }
 
@@ -94,19 +95,45 @@ std::vector<StaticView::Point> StaticView::StaticPoints(double confidence_thresh
   return points;
 }
 
-bool StaticView::SampleAgrees(const Eigen::Vector2d& pixel_in_original,
-                              double depth,
-                              double max_relative_depth_difference) const {
+template <typename Visit>
+bool StaticView::AnySampleAround(const Eigen::Vector2d& pixel_in_original,
+                                 const Visit& visit) const {
   const Eigen::Array2i bin = BinOf(pixel_in_original);
   for (int y = bin.y() - 1; y <= bin.y() + 1; ++y) {
     for (int x = bin.x() - 1; x <= bin.x() + 1; ++x) {
-      if (!depths_by_bin_.Contains(x, y)) continue;
-      for (const float measured : depths_by_bin_(x, y)) {
-        if (Agrees(measured, depth, max_relative_depth_difference)) return true;
-      }
+      if (!samples_by_bin_.Contains(x, y)) continue;
+      const std::vector<DepthSample>& samples = samples_by_bin_(x, y);
+      if (std::any_of(samples.begin(), samples.end(), visit)) return true;
     }
   }
   return false;
+}
+
+std::optional<DepthSample> StaticView::DepthAt(const Eigen::Vector2d& pixel_in_original) const {
+  if (!IsStatic(pixel_in_original)) return std::nullopt;
+  std::optional<DepthSample> nearest;
+  if (prediction_.depth.empty()) {
+    const Eigen::Vector2f pixel = pixel_in_original.cast<float>();
+    float nearest_distance = std::numeric_limits<float>::infinity();
+    AnySampleAround(pixel_in_original, [&](const DepthSample& sample) {
+      const float distance = (sample.pixel_in_original - pixel).norm();
+      if (distance < nearest_distance) {
+        nearest = sample;
+        nearest_distance = distance;
+      }
+      return false;
+    });
+    return nearest;
+  }
+  const Eigen::Vector2d pixel = Apply(network_from_original_, pixel_in_original);
+  const auto depth = SampleDepth(prediction_.depth, pixel);
+  if (!depth) return std::nullopt;
+  const ConfidenceMap& confidence = prediction_.depth_conf;
+  return DepthSample{pixel_in_original.cast<float>(),
+                     static_cast<float>(*depth),
+                     confidence.empty()
+                         ? 1.0f
+                         : confidence(static_cast<int>(pixel.x()), static_cast<int>(pixel.y()))};
 }
 
 std::optional<Eigen::Vector2d> StaticView::See(const Eigen::Vector3d& point_in_world,
@@ -121,7 +148,9 @@ std::optional<Eigen::Vector2d> StaticView::See(const Eigen::Vector3d& point_in_w
   if (!IsStatic(*pixel)) return std::nullopt;
   bool agrees = false;
   if (prediction_.depth.empty()) {
-    agrees = SampleAgrees(*pixel, point_in_cam.z(), max_relative_depth_difference);
+    agrees = AnySampleAround(*pixel, [&](const DepthSample& sample) {
+      return Agrees(sample.depth, point_in_cam.z(), max_relative_depth_difference);
+    });
   } else if (const auto measured =
                  SampleDepth(prediction_.depth, Apply(network_from_original_, *pixel))) {
     agrees = Agrees(*measured, point_in_cam.z(), max_relative_depth_difference);
