@@ -4,6 +4,7 @@
 #include "scene/error.h"
 
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 namespace vgtw {
@@ -16,6 +17,10 @@ class Grid {
   Grid() = default;
   Grid(int width, int height, T value = Zero())
       : width_(width), height_(height), data_(CheckedSize(width, height), value) {}
+  Grid(int width, int height, std::vector<T>&& data)
+      : width_(width), height_(height), data_(std::move(data)) {
+    VGTW_CHECK(data_.size() == CheckedSize(width, height), "grid data has another size");
+  }
 
   int width() const { return width_; }
   int height() const { return height_; }

@@ -151,11 +151,6 @@ std::optional<PngFormat> ParsePngFormat(Bytes file) {
   return PngFormat{bit_depth, static_cast<PngColour>(colour)};
 }
 
-bool IsGrayPng(Bytes file) {
-  const auto format = ParsePngFormat(file);
-  return format && format->bit_depth == 8 && format->colour == PngColour::kGray;
-}
-
 bool HasAlphaForPython(Bytes file) {
   const auto format = ParsePngFormat(file);
   if (!format) return false;

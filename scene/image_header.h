@@ -25,9 +25,6 @@ struct PngFormat {
 // What a PNG's header says of its pixels; nullopt for other or damaged files.
 std::optional<PngFormat> ParsePngFormat(std::span<const std::byte> file);
 
-// Whether a PNG has one channel of 8 bits: gray without palette or alpha, as masks are written.
-bool IsGrayPng(std::span<const std::byte> file);
-
 // Whether a PNG has an alpha channel that the Python imaging library keeps when it opens the file:
 // RGB with alpha, and gray with alpha of 16 bits, but not of 8.
 bool HasAlphaForPython(std::span<const std::byte> file);

@@ -4,9 +4,11 @@
 #include "scene/error.h"
 #include "scene/exif_focal_length.h"
 #include "scene/files.h"
+#include "scene/gray_png.h"
 #include "scene/image_header.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <set>
 #include <string_view>
@@ -124,12 +126,7 @@ ImageSize ReadImageSize(const fs::path& path) {
 
 GrayImage ReadMaskValues(const fs::path& path) {
   const MappedFile file(path);
-  if (IsGrayPng(file.bytes())) {  // a third of the time
-    const cv::Mat gray = Decode(path, file.bytes(), cv::IMREAD_GRAYSCALE);
-    GrayImage values(gray.cols, gray.rows);
-    std::copy(gray.datastart, gray.dataend, values.data().begin());
-    return values;
-  }
+  if (auto values = DecodeGrayPng(file.bytes())) return *std::move(values);
   const cv::Mat bgr = Decode(path, file.bytes(), cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH);
   if (bgr.depth() != CV_8U) {
     Fail(path, "has more than 8 bits per channel", "an 8-bit mask", "COLMAP 3.8 drops its image");
@@ -148,7 +145,16 @@ GrayImage ReadMaskValues(const fs::path& path) {
 
 StaticMask ReadStaticMask(const fs::path& path) {
   StaticMask static_mask = ReadMaskValues(path);
-  for (uint8_t& value : static_mask.data()) value = value == 0 ? 0 : 255;
+  std::vector<uint8_t>& values = static_mask.data();
+  const auto make_binary = [&](size_t i) { values[i] = values[i] == 0 ? 0 : 255; };
+  size_t i = 0;
+  for (; i + 8 <= values.size(); i += 8) {
+    uint64_t word = 0;
+    std::memcpy(&word, &values[i], 8);
+    if (word == 0 || word == ~uint64_t{0}) continue;  // most of a mask
+    for (size_t j = i; j < i + 8; ++j) make_binary(j);
+  }
+  for (; i < values.size(); ++i) make_binary(i);
   return static_mask;
 }
 

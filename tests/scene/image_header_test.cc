@@ -69,15 +69,6 @@ TEST(ParsePngFormat, SaysDepthAndColour) {
   EXPECT_FALSE(ParsePngFormat({}));
 }
 
-TEST(IsGrayPng, IsOneChannelOf8Bits) {
-  EXPECT_TRUE(IsGrayPng(Bytes(MakePng(2, 1, 8, 0, std::string(3, '\0')))));
-  EXPECT_FALSE(IsGrayPng(Bytes(MakePng(2, 1, 1, 0, std::string(2, '\0')))));
-  EXPECT_FALSE(IsGrayPng(Bytes(MakePng(2, 1, 16, 0, std::string(5, '\0')))));
-  EXPECT_FALSE(IsGrayPng(Bytes(MakePng(2, 1, 8, 4, std::string(5, '\0')))));  // with alpha
-  EXPECT_FALSE(IsGrayPng(Bytes(EncodedImage("a.png"))));
-  EXPECT_FALSE(IsGrayPng(Bytes(EncodedImage("a.jpg"))));
-}
-
 TEST(HasAlphaForPython, DependsOnTheColourType) {
   const auto has_alpha = [](int bit_depth, int colour_type) {
     return HasAlphaForPython(Bytes(MakePng(1, 1, bit_depth, colour_type, "")));
