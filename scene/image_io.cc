@@ -49,6 +49,22 @@ cv::Mat Decode(const fs::path& path,
   return pixels;
 }
 
+// As COLMAP's library makes gray of colours: luma of Rec. 709, in float, rounded.
+GrayImage ToLuma(const cv::Mat& bgr) {
+  GrayImage luma(bgr.cols, bgr.rows);
+  std::transform(
+      bgr.begin<cv::Vec3b>(),
+      bgr.end<cv::Vec3b>(),
+      luma.data().begin(),
+      [](const cv::Vec3b& pixel) {
+        const auto blue = static_cast<float>(pixel[0]);
+        const auto green = static_cast<float>(pixel[1]);
+        const auto red = static_cast<float>(pixel[2]);
+        return static_cast<uint8_t>(0.2126f * red + 0.7152f * green + 0.0722f * blue + 0.5f);
+      });
+  return luma;
+}
+
 std::string LowerExtension(const fs::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension) {
@@ -117,6 +133,15 @@ RgbImage ReadRgbImageOnWhite(const fs::path& path) {
   return image;
 }
 
+GrayImage ReadGrayImage(const fs::path& path) {
+  const MappedFile file(path);
+  const cv::Mat pixels = Decode(path, file.bytes(), cv::IMREAD_ANYCOLOR);
+  if (pixels.channels() != 1) return ToLuma(pixels);
+  GrayImage image(pixels.cols, pixels.rows);
+  std::copy(pixels.begin<uint8_t>(), pixels.end<uint8_t>(), image.data().begin());
+  return image;
+}
+
 ImageSize ReadImageSize(const fs::path& path) {
   const MappedFile file(path);
   if (const auto size = ParseImageSize(file.bytes())) return *size;
@@ -131,16 +156,7 @@ GrayImage ReadMaskValues(const fs::path& path) {
   if (bgr.depth() != CV_8U) {
     Fail(path, "has more than 8 bits per channel", "an 8-bit mask", "COLMAP 3.8 drops its image");
   }
-  GrayImage values(bgr.cols, bgr.rows);
-  std::transform(bgr.begin<cv::Vec3b>(),
-                 bgr.end<cv::Vec3b>(),
-                 values.data().begin(),
-                 [](const cv::Vec3b& pixel) {
-                   // COLMAP's library turns colour into luma of Rec. 709 and rounds it.
-                   const double luma = 0.0722 * pixel[0] + 0.7152 * pixel[1] + 0.2126 * pixel[2];
-                   return static_cast<uint8_t>(luma + 0.5);
-                 });
-  return values;
+  return ToLuma(bgr);
 }
 
 StaticMask ReadStaticMask(const fs::path& path) {

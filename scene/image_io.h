@@ -35,6 +35,10 @@ RgbImage ReadRgbImage(const std::filesystem::path& path);
 // turns white, and CMYK JPEGs, which differ by 1.
 RgbImage ReadRgbImageOnWhite(const std::filesystem::path& path);
 
+// The pixels of ReadRgbImage as the gray values in which COLMAP looks for features: luma of Rec.
+// 709, rounded. Throws as that does.
+GrayImage ReadGrayImage(const std::filesystem::path& path);
+
 // Size from the file's header only where the format allows (JPEG, PNG), else by decoding.
 ImageSize ReadImageSize(const std::filesystem::path& path);
 

@@ -169,6 +169,23 @@ TEST(ReadMaskValues, AreLuma) {
   EXPECT_EQ(ReadMaskValues(folder / "one_bit.png").data(), (std::vector<uint8_t>{0, 255, 0, 255}));
 }
 
+TEST(ReadGrayImage, IsLumaToTheBit) {
+  const TemporaryFolder folder;
+  RgbImage image(4, 1);
+  // The last two are 15.5 and 115.5 but for rounding; measured with COLMAP's library.
+  image.data() = {{255, 255, 255}, {100, 0, 0}, {0, 14, 76}, {0, 150, 100}};
+  WriteImage(folder / "rgb.png", image);
+  EXPECT_EQ(ReadGrayImage(folder / "rgb.png").data(), (std::vector<uint8_t>{255, 21, 16, 115}));
+  GrayImage gray(3, 1);
+  gray.data() = {0, 77, 255};
+  WriteImage(folder / "gray.png", gray);
+  EXPECT_EQ(ReadGrayImage(folder / "gray.png"), gray);
+  WriteFileAtomically(folder / "sixteen.png", MakePng(1, 1, 16, 0, std::string("\0\x80\xff", 3)));
+  EXPECT_EQ(ReadGrayImage(folder / "sixteen.png").data(), (std::vector<uint8_t>{128}));
+  WriteFileAtomically(folder / "rgba.png", MakePng(1, 1, 8, 6, std::string("\0\x64\0\0\0", 5)));
+  EXPECT_EQ(ReadGrayImage(folder / "rgba.png").data(), (std::vector<uint8_t>{21}));
+}
+
 TEST(ReadAlpha, IsTheFourthChannelOrNone) {
   const TemporaryFolder folder;
   WriteFileAtomically(folder / "rgba.png",
