@@ -78,8 +78,8 @@ ApplyMasksSummary ApplyMasks(const fs::path& database_path,
 
   MaskUndo undo(edit.target(), options.keep_undo);
   const bool removes_keypoints = options.rule == MaskRule::kKeypoints;
-  if (removes_keypoints) RemoveKeypoints(edit.target(), images, undo, progress);
-  FilterPairs(edit.target(),
+  if (removes_keypoints) RemoveKeypoints(edit.source(), images, undo, progress);
+  FilterPairs(edit.source(),
               {.renumber = removes_keypoints,
                .min_num_inliers = static_cast<uint64_t>(options.min_num_inliers)},
               undo,

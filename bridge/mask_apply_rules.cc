@@ -23,10 +23,12 @@ struct Pair {
   int64_t pair_id = 0;
   size_t image_idx1 = 0;
   size_t image_idx2 = 0;
+  int64_t config = 0;      // of a geometry
   FeatureMatches matches;  // every index is one of a keypoint
 };
 
-// Reads the pairs of a table one at a time, so that they may be changed meanwhile.
+// Reads the pairs of a table in their order. A pair may be changed once it was read: it keeps its
+// place in that order.
 class PairReader {
  public:
   PairReader(SqliteConnection& connection,
@@ -35,23 +37,24 @@ class PairReader {
       : connection_(connection),
         table_(table),
         images_(images),
-        sql_(MaskedTableSql("SELECT pair_id, rows, cols, data FROM {table} WHERE pair_id > ? "
-                            "ORDER BY pair_id LIMIT 1",
-                            table)) {
+        query_(connection,
+               MaskedTableSql("SELECT pair_id, rows, cols, data, {config} FROM {table} AS t "
+                              "ORDER BY pair_id",
+                              table)) {
     for (size_t i = 0; i < images.size(); ++i) image_idx_by_id_[images[i].image_id] = i;
   }
 
   std::optional<Pair> Next() {
-    SqliteQuery query(connection_, sql_, previous_pair_id_);
-    if (!query.Next()) return std::nullopt;
+    if (!query_.Next()) return std::nullopt;
     Pair pair;
-    pair.pair_id = previous_pair_id_ = query.Int(0);
-    const auto [image_id1, image_id2] = CheckedImageIds(query, pair.pair_id);
+    pair.pair_id = query_.Int(0);
+    pair.config = query_.Int(4);
+    const auto [image_id1, image_id2] = CheckedImageIds(query_, pair.pair_id);
     const std::string name = std::string(table_.row_label) + " of images " +
                              std::to_string(image_id1) + " and " + std::to_string(image_id2);
     pair.image_idx1 = FindImage(image_id1, name);
     pair.image_idx2 = FindImage(image_id2, name);
-    pair.matches = ReadMatchesBlob(query, 1, name);
+    pair.matches = ReadMatchesBlob(query_, 1, name);
     std::array<uint32_t, 2> largest = {0, 0};
     for (const auto& [point2D_idx1, point2D_idx2] : pair.matches) {
       largest = {std::max(largest[0], point2D_idx1), std::max(largest[1], point2D_idx2)};
@@ -84,9 +87,8 @@ class PairReader {
   SqliteConnection& connection_;
   const MaskedTable& table_;
   const std::vector<MaskedImage>& images_;
-  std::string sql_;
+  SqliteQuery query_;
   ImageIndexById image_idx_by_id_;
-  int64_t previous_pair_id_ = std::numeric_limits<int64_t>::min();
 };
 
 // The connected components of all keypoints under links between two of them.
@@ -141,6 +143,7 @@ void RemoveRows(SqliteConnection& connection,
                 const MaskedTable& table,
                 const MaskedImage& image,
                 MaskUndo& undo) {
+  std::vector<std::byte> original;
   std::vector<std::byte> kept;
   size_t num_kept = 0;
   {
@@ -158,6 +161,7 @@ void RemoveRows(SqliteConnection& connection,
            owner + " has " + std::to_string(blob.rows) + " rows",
            "one per keypoint, " + std::to_string(image.is_excluded.size()));
     }
+    original.assign(blob.bytes.begin(), blob.bytes.end());
     const size_t row_bytes = blob.cols * table.bytes_per_value;
     kept.reserve(blob.bytes.size());
     for (size_t row = 0; row < blob.rows; ++row) {
@@ -167,7 +171,8 @@ void RemoveRows(SqliteConnection& connection,
       ++num_kept;
     }
   }
-  undo.Rewrite(table, image.image_id, num_kept, kept);
+  const MaskedRow row = {image.is_excluded.size(), original};
+  undo.Rewrite(table, image.image_id, row, num_kept, kept);
 }
 
 struct Counts {
@@ -222,7 +227,10 @@ Counts FilterTable(SqliteConnection& connection,
   PairReader reader(connection, table, images);
   while (const auto pair = reader.Next()) {
     const FeatureMatches kept = filter.Filter(*pair);
-    if (kept != pair->matches) undo.Rewrite(table, pair->pair_id, kept.size(), AsBlob(kept));
+    if (kept != pair->matches) {
+      const MaskedRow original = {pair->matches.size(), AsBlob(pair->matches), pair->config};
+      undo.Rewrite(table, pair->pair_id, original, kept.size(), AsBlob(kept));
+    }
     counts.before += pair->matches.size();
     counts.after += kept.size();
     visit(*pair, kept);
@@ -257,20 +265,20 @@ uint64_t ExcludeTracks(SqliteConnection& connection,
   return num_linked;
 }
 
-void RemoveKeypoints(SqliteConnection& connection,
+void RemoveKeypoints(SqliteConnection& source,
                      const std::vector<MaskedImage>& images,
                      MaskUndo& undo,
                      ProgressCounter& progress) {
   for (const MaskedImage& image : images) {
     if (image.summary.num_excluded_keypoints > 0) {
-      RemoveRows(connection, kKeypointsTable, image, undo);
-      RemoveRows(connection, kDescriptorsTable, image, undo);
+      RemoveRows(source, kKeypointsTable, image, undo);
+      RemoveRows(source, kDescriptorsTable, image, undo);
     }
     progress.Advance(1);
   }
 }
 
-void FilterPairs(SqliteConnection& connection,
+void FilterPairs(SqliteConnection& source,
                  const FilterPairsOptions& options,
                  MaskUndo& undo,
                  ProgressCounter& progress,
@@ -278,7 +286,7 @@ void FilterPairs(SqliteConnection& connection,
                  ApplyMasksSummary& summary) {
   const auto filter = [&](const MaskedTable& table, uint64_t min_num_rows, const auto& visit) {
     const PairFilter pair_filter(images, options.renumber, min_num_rows);
-    return FilterTable(connection, table, images, pair_filter, undo, visit);
+    return FilterTable(source, table, images, pair_filter, undo, visit);
   };
   const Counts matches =
       filter(kMatchesTable, 0, [&](const Pair&, const FeatureMatches&) { progress.Advance(1); });

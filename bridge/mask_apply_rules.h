@@ -18,8 +18,9 @@ uint64_t ExcludeTracks(SqliteConnection& connection,
                        std::vector<MaskedImage>& images,
                        ProgressCounter& progress);
 
-// Removes excluded keypoints and their descriptors. Advances by one per image.
-void RemoveKeypoints(SqliteConnection& connection,
+// Removes excluded keypoints and their descriptors: reads from `source`, writes by `undo`, whose
+// database has the same content or is the same. Advances by one per image.
+void RemoveKeypoints(SqliteConnection& source,
                      const std::vector<MaskedImage>& images,
                      MaskUndo& undo,
                      ProgressCounter& progress);
@@ -29,9 +30,9 @@ struct FilterPairsOptions {
   uint64_t min_num_inliers = 0;
 };
 
-// Removes the rows of matches and two-view geometries with an excluded endpoint. Advances by one
-// per row of the tables. Tells of each image whether it had and has a geometry.
-void FilterPairs(SqliteConnection& connection,
+// Removes the rows of matches and two-view geometries with an excluded endpoint, in the same way.
+// Advances by one per row of the tables. Tells of each image whether it had and has a geometry.
+void FilterPairs(SqliteConnection& source,
                  const FilterPairsOptions& options,
                  MaskUndo& undo,
                  ProgressCounter& progress,

@@ -150,33 +150,32 @@ MaskUndo::MaskUndo(SqliteConnection& connection, bool keep)
   }
 }
 
-void MaskUndo::Keep(const MaskedTable& table, int64_t row_id, size_t rows, BlobBytes data) {
+void MaskUndo::Keep(const MaskedTable& table,
+                    int64_t row_id,
+                    const MaskedRow& original,
+                    int64_t applied_hash) {
   if (!has_table_) CreateTable(connection_);
   has_table_ = true;
   connection_.Execute(
-      MaskedTableSql(
-          "INSERT INTO vgtw_mask_undo (table_name, row_id, rows, config, applied_hash, data) "
-          "SELECT '{table}', {row_id}, rows, {config}, "
-          "?2 + CASE ?3 WHEN 0 THEN 0 ELSE {config} END, data FROM {table} AS t "
-          "WHERE {row_id} = ?1 ON CONFLICT (table_name, row_id) DO UPDATE "
-          "SET applied_hash = excluded.applied_hash WHERE applied_hash IS NOT NULL",
-          table),
+      "INSERT INTO vgtw_mask_undo (table_name, row_id, rows, config, applied_hash, data) "
+      "VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT (table_name, row_id) DO UPDATE "
+      "SET applied_hash = excluded.applied_hash WHERE applied_hash IS NOT NULL",
+      std::string_view(table.name),
       row_id,
-      Fingerprint(data),
-      rows);
+      original.rows,
+      original.config,
+      applied_hash,
+      original.data);
 }
 
-void MaskUndo::Rewrite(const MaskedTable& table, int64_t row_id, size_t rows, BlobBytes data) {
-  if (keep_) Keep(table, row_id, rows, data);
-  connection_.Execute(
-      MaskedTableSql(table.has_config
-                         ? "UPDATE {table} AS t SET rows = ?1, data = ?2, "
-                           "config = CASE ?1 WHEN 0 THEN 0 ELSE config END WHERE {row_id} = ?3"
-                         : "UPDATE {table} AS t SET rows = ?1, data = ?2 WHERE {row_id} = ?3",
-                     table),
-      rows,
-      data,
-      row_id);
+void MaskUndo::Rewrite(const MaskedTable& table,
+                       int64_t row_id,
+                       const MaskedRow& original,
+                       size_t rows,
+                       BlobBytes data) {
+  const int64_t config = rows == 0 ? 0 : original.config;
+  if (keep_) Keep(table, row_id, original, Fingerprint(data) + config);
+  connection_.Execute(table.update_sql, rows, data, config, row_id);
 }
 
 }  // namespace vgtw

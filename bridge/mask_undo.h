@@ -20,20 +20,50 @@ namespace vgtw {
 
 // A table of COLMAP whose rows masks change.
 struct MaskedTable {
-  const char* name;       // as in the database
-  const char* row_id;     // its primary key
-  const char* row_label;  // in messages
+  const char* name;        // as in the database
+  const char* row_id;      // its primary key
+  const char* row_label;   // in messages
+  const char* update_sql;  // rows, data, configuration, row id
   size_t bytes_per_value;
   bool has_config;
 };
-inline constexpr MaskedTable kKeypointsTable = {"keypoints", "image_id", "keypoints", 4, false};
+inline constexpr MaskedTable kKeypointsTable = {
+    "keypoints",
+    "image_id",
+    "keypoints",
+    "UPDATE keypoints SET rows = ?1, data = ?2 WHERE image_id = ?4",
+    4,
+    false};
 inline constexpr MaskedTable kDescriptorsTable = {
-    "descriptors", "image_id", "descriptors", 1, false};
-inline constexpr MaskedTable kMatchesTable = {"matches", "pair_id", "matches", 4, false};
+    "descriptors",
+    "image_id",
+    "descriptors",
+    "UPDATE descriptors SET rows = ?1, data = ?2 WHERE image_id = ?4",
+    1,
+    false};
+inline constexpr MaskedTable kMatchesTable = {
+    "matches",
+    "pair_id",
+    "matches",
+    "UPDATE matches SET rows = ?1, data = ?2 WHERE pair_id = ?4",
+    4,
+    false};
 inline constexpr MaskedTable kTwoViewTable = {
-    "two_view_geometries", "pair_id", "two-view geometry", 4, true};
+    "two_view_geometries",
+    "pair_id",
+    "two-view geometry",
+    "UPDATE two_view_geometries SET rows = ?1, data = ?2, config = ?3 WHERE pair_id = ?4",
+    4,
+    true};
 inline constexpr std::array kMaskedTables = {
     kKeypointsTable, kDescriptorsTable, kMatchesTable, kTwoViewTable};
+
+// What a row of such a table holds of what masks change.
+struct MaskedRow {
+  size_t rows = 0;
+  BlobBytes data;
+  int64_t config = 0;  // of a two-view geometry
+};
 
 // `text` with the names of a table in place of {table}, {row_id}, and {config}: the column of the
 // table `t`, or 0 where it has none.
@@ -46,11 +76,19 @@ class MaskUndo {
   // run are marked first.
   MaskUndo(SqliteConnection& connection, bool keep);
 
-  // Replaces rows and data; a two-view geometry without rows gets configuration 0.
-  void Rewrite(const MaskedTable& table, int64_t row_id, size_t rows, BlobBytes data);
+  // Replaces `original`, which is what the row holds, by `rows` rows of `data`; a two-view geometry
+  // without rows gets configuration 0.
+  void Rewrite(const MaskedTable& table,
+               int64_t row_id,
+               const MaskedRow& original,
+               size_t rows,
+               BlobBytes data);
 
  private:
-  void Keep(const MaskedTable& table, int64_t row_id, size_t rows, BlobBytes data);
+  void Keep(const MaskedTable& table,
+            int64_t row_id,
+            const MaskedRow& original,
+            int64_t applied_hash);
 
   SqliteConnection& connection_;
   bool keep_;

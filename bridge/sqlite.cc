@@ -139,7 +139,7 @@ void SqliteConnection::Open() {
       flags = SQLITE_OPEN_READONLY;
     }
   }
-  const int code = sqlite3_open_v2(name.c_str(), &handle_, flags, nullptr);
+  const int code = sqlite3_open_v2(name.c_str(), &handle_, flags | SQLITE_OPEN_NOMUTEX, nullptr);
   if (code != SQLITE_OK) Throw(code);
   sqlite3_extended_result_codes(handle_, 1);
   sqlite3_busy_timeout(handle_, kBusyTimeoutMs);
@@ -207,7 +207,8 @@ void SqliteConnection::CopyBytes(const fs::path& target_path) const {
   int code = file->pMethods->xFileSize(file, &size);
   if (code != SQLITE_OK) Throw(code);
   std::ofstream target(target_path, std::ios::binary | std::ios::trunc);
-  std::vector<char> block(size_t{1} << 20);
+  // Larger blocks make large folios on ext4, which then slow down every write of a single page.
+  std::vector<char> block(size_t{1} << 16);
   for (sqlite3_int64 offset = 0; offset < size; offset += std::ssize(block)) {
     block.resize(static_cast<size_t>(std::min<sqlite3_int64>(std::ssize(block), size - offset)));
     code = file->pMethods->xRead(file, block.data(), static_cast<int>(block.size()), offset);
