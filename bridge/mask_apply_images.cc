@@ -96,8 +96,9 @@ void TestKeypoints(const fs::path& mask_folder,
   image.summary.num_keypoints = spots.size();
   image.is_excluded.assign(spots.size(), false);
   if (!image.summary.has_mask) return;
-  const StaticMask static_mask =
-      ReadMaskOfSize(MaskPath(mask_folder, image.summary.image_name), {image.width, image.height});
+  // Any value but 0 is kept; to make it 255 first would be a pass over all pixels for nothing.
+  const GrayImage static_mask = ReadMaskValuesOfSize(
+      MaskPath(mask_folder, image.summary.image_name), {image.width, image.height});
   const bool dilates = options.dilate_px > 0 || options.dilate_scale > 0.0;
   const Grid<float> distance = dilates ? DistanceToExcluded(static_mask) : Grid<float>();
   for (size_t i = 0; i < spots.size(); ++i) {

@@ -14,6 +14,17 @@ StaticMask AllWhite(uint64_t width, uint64_t height) {
   return {static_cast<int>(width), static_cast<int>(height), 255};
 }
 
+GrayImage WithCheckedSize(GrayImage mask,
+                          const std::filesystem::path& path,
+                          const ImageSize& size) {
+  CheckSize(path,
+            SizeOf(mask),
+            size,
+            "the size of its image",
+            "write masks at full size: COLMAP does not resize them");
+  return mask;
+}
+
 }  // namespace
 
 std::filesystem::path MaskPath(const std::filesystem::path& mask_folder,
@@ -34,13 +45,11 @@ void CheckSize(const std::filesystem::path& path,
 }
 
 StaticMask ReadMaskOfSize(const std::filesystem::path& path, const ImageSize& size) {
-  StaticMask static_mask = ReadStaticMask(path);
-  CheckSize(path,
-            SizeOf(static_mask),
-            size,
-            "the size of its image",
-            "write masks at full size: COLMAP does not resize them");
-  return static_mask;
+  return WithCheckedSize(ReadStaticMask(path), path, size);
+}
+
+GrayImage ReadMaskValuesOfSize(const std::filesystem::path& path, const ImageSize& size) {
+  return WithCheckedSize(ReadMaskValues(path), path, size);
 }
 
 void CheckMasksExist(const std::filesystem::path& mask_folder,

@@ -23,6 +23,9 @@ std::filesystem::path MaskPath(const std::filesystem::path& mask_folder,
 // not resize masks, a smaller one silently excludes what lies beyond it.
 StaticMask ReadMaskOfSize(const std::filesystem::path& path, const ImageSize& size);
 
+// The same before every value but 0 becomes 255.
+GrayImage ReadMaskValuesOfSize(const std::filesystem::path& path, const ImageSize& size);
+
 // Throws Error "<path>: has W x H pixels, expected W x H pixels, <whose>; <hint>" unless the sizes
 // are the same.
 void CheckSize(const std::filesystem::path& path,
