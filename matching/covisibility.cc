@@ -89,11 +89,15 @@ Covisibility::Covisibility(const std::vector<ViewSketch>& sketches,
   }
   const bool all_have_points = std::all_of(
       sketches.begin(), sketches.end(), [](const ViewSketch& s) { return !s.points.empty(); });
-  if (all_have_points) return;
-  const double scene_depth = SceneDepth();
+  const double scene_depth = all_have_points ? 0.0 : SceneDepth();
   for (size_t i = 0; i < sketches.size(); ++i) {
-    if (!eyes_[i].is_usable || HasOwnPoints(i)) continue;
-    eyes_[i].assumed_points = AssumePoints(sketches[i].view, scene_depth);
+    Eye& eye = eyes_[i];
+    if (!eye.is_usable) continue;
+    if (!HasOwnPoints(i)) eye.assumed_points = AssumePoints(sketches[i].view, scene_depth);
+    for (const Eigen::Vector3d& point : PointsOf(i)) {
+      const double depth = eye.rotation.row(2).dot(point) + eye.translation.z();
+      eye.footprints.push_back(depth * eye.footprint_per_depth);
+    }
   }
 }
 
@@ -105,7 +109,7 @@ Covisibility::Eye Covisibility::MakeEye(const View& view, double position_error_
   eye.rotation = view.cam_from_world.rotation.toRotationMatrix();
   eye.translation = view.cam_from_world.translation;
   eye.centre = OriginInSource(view.cam_from_world);
-  eye.max_ray_radius = MaxRayRadius(view.camera);
+  eye.squared_ray_radius = std::pow(MaxRayRadius(view.camera), 2);
   eye.footprint_per_depth = longer_side / view.camera.MeanFocalLength();
   eye.position_error_px = position_error_percent / 100.0 * longer_side;
   return eye;
@@ -135,18 +139,12 @@ const std::vector<Eigen::Vector3d>& Covisibility::PointsOf(size_t view_idx) cons
   return HasOwnPoints(view_idx) ? sketches_[view_idx].points : eyes_[view_idx].assumed_points;
 }
 
-double Covisibility::FootprintAt(size_t view_idx, const Eigen::Vector3d& point_in_world) const {
-  const Eye& eye = eyes_[view_idx];
-  if (!eye.is_usable) return 0.0;
-  return (eye.rotation.row(2).dot(point_in_world) + eye.translation.z()) * eye.footprint_per_depth;
+const std::vector<double>& Covisibility::FootprintsOf(size_t view_idx) const {
+  return eyes_[view_idx].footprints;
 }
 
-bool Covisibility::Sees(size_t view_idx, const Eigen::Vector3d& point_in_world) const {
+bool Covisibility::HasAtItsDepth(size_t view_idx, const Eigen::Vector3d& point_in_cam) const {
   const Eye& eye = eyes_[view_idx];
-  const Eigen::Vector3d point_in_cam = eye.rotation * point_in_world + eye.translation;
-  const double depth = point_in_cam.z();
-  // Beyond the corners, the formula of a distorted lens may fold points back into the image.
-  if (!(depth > 0.0 && point_in_cam.head<2>().norm() <= eye.max_ray_radius * depth)) return false;
   const Camera& camera = sketches_[view_idx].view.camera;
   const auto pixel = Project(camera, point_in_cam);
   if (!pixel) return false;
@@ -164,7 +162,8 @@ bool Covisibility::Sees(size_t view_idx, const Eigen::Vector3d& point_in_world) 
   const Eigen::Array2i max = cell_of(eye.position_error_px);
   for (int y = min.y(); y <= max.y(); ++y) {
     for (int x = min.x(); x <= max.x(); ++x) {
-      if (IsSimilar(map(x, y), depth, options_.max_relative_depth_difference)) return true;
+      if (IsSimilar(map(x, y), point_in_cam.z(), options_.max_relative_depth_difference))
+        return true;
     }
   }
   return false;
@@ -173,20 +172,25 @@ bool Covisibility::Sees(size_t view_idx, const Eigen::Vector3d& point_in_world) 
 double Covisibility::SeenFraction(size_t from_idx,
                                   size_t by_idx,
                                   std::vector<double>& cosines) const {
+  const Eye& from = eyes_[from_idx];
+  const Eye& by = eyes_[by_idx];
   const std::vector<Eigen::Vector3d>& points = PointsOf(from_idx);
   size_t num_seen = 0;
-  for (const Eigen::Vector3d& point : points) {
-    const double footprint = FootprintAt(from_idx, point);
-    const double other_footprint = FootprintAt(by_idx, point);
-    if (!(footprint > 0.0 && other_footprint > 0.0) ||
-        !IsSimilar(footprint, other_footprint, options_.max_size_ratio - 1.0)) {
+  for (size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d point_in_cam = by.rotation * points[i] + by.translation;
+    const double depth = point_in_cam.z();
+    // Beyond the corners, the formula of a distorted lens may fold points back into the image.
+    if (!(depth > 0.0 &&
+          point_in_cam.head<2>().squaredNorm() <= by.squared_ray_radius * depth * depth)) {
       continue;
     }
-    const Eigen::Vector3d ray = point - eyes_[from_idx].centre;
-    const Eigen::Vector3d other_ray = point - eyes_[by_idx].centre;
+    const double footprint = depth * by.footprint_per_depth;
+    if (!IsSimilar(footprint, from.footprints[i], options_.max_size_ratio - 1.0)) continue;
+    const Eigen::Vector3d ray = points[i] - from.centre;
+    const Eigen::Vector3d other_ray = points[i] - by.centre;
     const double cosine =
         ray.dot(other_ray) / std::sqrt(ray.squaredNorm() * other_ray.squaredNorm());
-    if (!(cosine >= min_cosine_) || !Sees(by_idx, point)) continue;
+    if (!(cosine >= min_cosine_) || !HasAtItsDepth(by_idx, point_in_cam)) continue;
     cosines.push_back(cosine);
     ++num_seen;
   }

@@ -46,8 +46,9 @@ class Covisibility {
 
   size_t num_views() const { return eyes_.size(); }
   const std::vector<Eigen::Vector3d>& PointsOf(size_t view_idx) const;
-  // Size of what fills the image's longer side at the point; <= 0 if it is not in front.
-  double FootprintAt(size_t view_idx, const Eigen::Vector3d& point_in_world) const;
+  // How much of the world the image's longer side spans at each of these points; <= 0 or NaN where
+  // one is not in front. None of a view that shares nothing for a fault.
+  const std::vector<double>& FootprintsOf(size_t view_idx) const;
 
   // Covisibility is the fraction of the points of one view that the other sees, the smaller one of
   // both directions: matches are pairs, so that the view that shares less bounds their share. (The
@@ -63,16 +64,18 @@ class Covisibility {
     Eigen::Matrix3d rotation;  // cam_from_world
     Eigen::Vector3d translation;
     Eigen::Vector3d centre;
-    double max_ray_radius = 0.0;       // of the corners
+    double squared_ray_radius = 0.0;   // of the corners, the largest
     double footprint_per_depth = 0.0;  // longer side / focal length
     double position_error_px = 0.0;
     std::vector<Eigen::Vector3d> assumed_points;
+    std::vector<double> footprints;
   };
 
   static Eye MakeEye(const View& view, double position_error_percent);
   double SceneDepth() const;
   bool HasOwnPoints(size_t view_idx) const;
-  bool Sees(size_t view_idx, const Eigen::Vector3d& point_in_world) const;
+  // Whether the image shows the point, as far as the map of depth tells.
+  bool HasAtItsDepth(size_t view_idx, const Eigen::Vector3d& point_in_cam) const;
   // Fraction of the points of a view that another one sees; appends the cosines of their rays.
   double SeenFraction(size_t from_idx, size_t by_idx, std::vector<double>& cosines) const;
 

@@ -31,11 +31,12 @@ uint64_t VoxelKey(const Eigen::Vector3d& point, int level) {
 // Keys of the voxels of a view's points, one per point and level, ascending.
 std::vector<uint64_t> KeysOf(const Covisibility& covisibility, size_t view_idx) {
   std::vector<uint64_t> keys;
-  for (const Eigen::Vector3d& point : covisibility.PointsOf(view_idx)) {
-    const double footprint = covisibility.FootprintAt(view_idx, point);
-    if (!(footprint > 0.0 && point.allFinite())) continue;
-    const int level = std::ilogb(kEdgePerFootprint * footprint);
-    for (const int step : {-1, 0, 1}) keys.push_back(VoxelKey(point, level + step));
+  const std::vector<Eigen::Vector3d>& points = covisibility.PointsOf(view_idx);
+  const std::vector<double>& footprints = covisibility.FootprintsOf(view_idx);
+  for (size_t i = 0; i < footprints.size(); ++i) {
+    if (!(footprints[i] > 0.0 && points[i].allFinite())) continue;
+    const int level = std::ilogb(kEdgePerFootprint * footprints[i]);
+    for (const int step : {-1, 0, 1}) keys.push_back(VoxelKey(points[i], level + step));
   }
   std::sort(keys.begin(), keys.end());
   return keys;
