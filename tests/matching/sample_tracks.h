@@ -6,6 +6,7 @@
 #include "scene/reconstruction.h"
 #include "tests/support/wall_prediction.h"
 
+#include <cmath>
 #include <map>
 #include <string>
 #include <vector>
