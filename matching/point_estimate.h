@@ -36,8 +36,9 @@ struct PointEstimate {
 };
 
 // The maximum-likelihood point under Tukey's robust loss on both kinds of errors, from the best of
-// what single sightings and pairs with a range say. nullopt unless the rays of two agree, with the
-// point in front of them, and the ranges of more than half of those that have one.
+// what single sightings and pairs with a range say. nullopt unless the rays of two and of half of
+// all agree, with the point in front of them, and the ranges of more than half of those that have
+// one.
 std::optional<PointEstimate> EstimatePoint(std::span<const Sighting> sightings,
                                            const PointLimits& limits);
 

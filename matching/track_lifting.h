@@ -53,10 +53,10 @@ struct LiftedTracks {
 // The point is the most likely one under these, so that rays decide across and, where they meet at
 // an angle, along each other; views beyond the limits have no weight. It starts from the best of
 // what single views and pairs of views say, lest wrong depths or matches decide.
-// A track stays unknown unless the rays of at least two views agree, the point in front of them,
-// and the depths of more than half of those that have one. Views without depth take part with their
-// rays; elements whose image is not in `views` take none. `scales` may lack views, whose scale
-// is 1. Throws std::invalid_argument if a track names a keypoint that its view lacks.
+// A track stays unknown unless the rays of two views and of half of all agree, the point in front
+// of them, and the depths of more than half of those that have one. Views without depth take part
+// with their rays; elements whose image is not in `views` take none. `scales` may lack views, whose
+// scale is 1. Throws std::invalid_argument if a track names a keypoint that its view lacks.
 LiftedTracks LiftTracks(const std::map<ImageId, ViewFeatures>& views,
                         const std::vector<std::vector<TrackElement>>& tracks,
                         const DepthScales& scales,
