@@ -11,6 +11,21 @@ function(vgtw_compile_options target)
   endif()
 endfunction()
 
+# vgtw_precompile(TARGET HEADER...) or (TARGET REUSE_FROM OTHER), with VGTW_PRECOMPILE only: what nearly
+# every source includes is parsed once, which halves the time to compile. Not by default, because a
+# missing #include then goes unnoticed and ccache has to be told.
+function(vgtw_precompile target)
+  if(NOT VGTW_PRECOMPILE)
+    return()
+  elseif(ARGV1 STREQUAL "REUSE_FROM")
+    target_precompile_headers(${target} REUSE_FROM ${ARGV2})
+  else()
+    target_precompile_headers(${target} PRIVATE
+      <Eigen/Geometry> <algorithm> <array> <cmath> <filesystem> <fstream> <functional> <map>
+      <optional> <random> <set> <span> <sstream> <string> <unordered_map> <vector> ${ARGN})
+  endif()
+endfunction()
+
 # vgtw_add_library(scene HEADERS a.h ... SOURCES a.cc ... [PUBLIC lib ...] [PRIVATE lib ...])
 # makes vgtw::scene, which is also the component `scene` of the installed package.
 # HEADERS are the folder's doors: they are installed, must stand alone and include nothing heavy.
@@ -25,6 +40,7 @@ function(vgtw_add_library name)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   vgtw_compile_options(${target})
+  vgtw_precompile(${target})
   set_property(GLOBAL APPEND PROPERTY VGTW_COMPONENTS ${name})
   install(TARGETS ${target} EXPORT vgtw_${name}
           FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vgtw)

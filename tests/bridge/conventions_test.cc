@@ -190,9 +190,10 @@ struct Fern {
     ConventionCheck check(job);
     for (const auto& [image_id, image] : model.images) {
       ImportedView imported;
-      const auto photo = std::find_if(job.photos.begin(), job.photos.end(), [&](const Photo& p) {
-        return p.name == image.name;
-      });
+      const auto photo =
+          std::find_if(job.photos.begin(), job.photos.end(), [&name = image.name](const Photo& p) {
+            return p.name == name;
+          });
       imported.photo_idx = static_cast<size_t>(photo - job.photos.begin());
       if (!photo_of_view.empty()) imported.photo_idx = photo_of_view[imported.photo_idx];
       imported.pose = Scene::Mistaken(image.cam_from_world, repair);

@@ -145,7 +145,7 @@ TEST_F(ConvertCheckpointTest, OverflowIsAnErrorThatNamesTheTensor) {
       {TensorType::kF64, Bytes(1e39), TensorType::kF32},
       {TensorType::kF32, Bytes(float_max), TensorType::kBF16}};
   for (const auto& [from, bytes, to] : cases) {
-    EXPECT_THAT(ErrorOf([&] { Converted(from, bytes, to); }),
+    EXPECT_THAT(ErrorOf([&, from = from, &bytes = bytes, to = to] { Converted(from, bytes, to); }),
                 AllOf(HasSubstr("'w'"), HasSubstr("too large for"), HasSubstr(TensorTypeName(to))));
     EXPECT_THAT(Snapshot(folder_.path()), testing::SizeIs(1));  // the input alone
   }
