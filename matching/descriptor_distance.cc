@@ -27,6 +27,9 @@ VGTW_FOR_EACH_CPU int SumOfSquares(const uint8_t* a, const uint8_t* b, size_t n)
   return sum;
 }
 
+// Squares of so many bytes sum up within an int.
+constexpr uint32_t kMaxNumBytes = 33000;
+
 bool IsFloat(const Descriptors& descriptors) { return descriptors.type > 0; }
 
 }  // namespace
@@ -37,12 +40,14 @@ DescriptorDistance::DescriptorDistance(const Descriptors& descriptors1,
       data2_(descriptors2.data.data()),
       num_bytes_(descriptors1.rows > 0 ? descriptors1.cols : descriptors2.cols),
       is_float_(IsFloat(descriptors1.rows > 0 ? descriptors1 : descriptors2)) {
+  const int type = (descriptors1.rows > 0 ? descriptors1 : descriptors2).type;
   for (const Descriptors* set : {&descriptors1, &descriptors2}) {
     VGTW_CHECK(set->data.size() == size_t{set->rows} * set->cols, "size of descriptors");
     if (set->rows == 0) continue;
-    VGTW_CHECK(set->cols == num_bytes_ && IsFloat(*set) == is_float_,
+    VGTW_CHECK(set->cols == num_bytes_ && (is_float_ ? set->type == type : !IsFloat(*set)),
                "descriptors of different kinds cannot be compared");
     VGTW_CHECK(!is_float_ || set->cols % sizeof(float) == 0, "float32 descriptors");
+    VGTW_CHECK(is_float_ || set->cols <= kMaxNumBytes, "length of descriptors");
   }
 }
 

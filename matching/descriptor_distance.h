@@ -14,8 +14,9 @@ namespace vgtw {
 // SIFT and undefined types are bytes, all others little-endian float32 (COLMAP 4's ALIKED).
 class DescriptorDistance {
  public:
-  // Throws std::invalid_argument if types or lengths disagree, or floats are cut off. An empty set
-  // goes with every other.
+  // Both sets must outlive it. Throws std::invalid_argument if types or lengths disagree (SIFT and
+  // undefined agree), floats are cut off, or bytes are more than 33,000. An empty set goes with
+  // every other.
   DescriptorDistance(const Descriptors& descriptors1, const Descriptors& descriptors2);
 
   float operator()(size_t idx1, size_t idx2) const {

@@ -14,7 +14,8 @@ constexpr double kMaxCellsPerSide = 1024.0;
 
 FeatureGrid::FeatureGrid(const std::vector<Eigen::Vector2f>& pixels, float width, float height)
     : pixels_(&pixels) {
-  VGTW_CHECK(width > 0.0f && height > 0.0f, "size of the grid");
+  VGTW_CHECK(width > 0.0f && std::isfinite(width), "width of the grid");
+  VGTW_CHECK(height > 0.0f && std::isfinite(height), "height of the grid");
   const double area = static_cast<double>(width) * height;
   const double num_pixels = std::max<double>(1.0, static_cast<double>(pixels.size()));
   cell_px_ = static_cast<float>(std::max(std::sqrt(area * kPixelsPerCell / num_pixels),

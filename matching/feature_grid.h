@@ -30,7 +30,7 @@ struct Capsule {
 class FeatureGrid {
  public:
   // `pixels` must outlive the grid; those outside of [0, width) x [0, height) count for the nearest
-  // cell. Throws std::invalid_argument for sizes that are not positive.
+  // cell. Throws std::invalid_argument for sizes that are not positive and finite.
   FeatureGrid(const std::vector<Eigen::Vector2f>& pixels, float width, float height);
 
   // Calls visit(idx) for every pixel in the capsule, in an order that depends on the grid alone.

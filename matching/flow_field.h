@@ -25,8 +25,8 @@ class FlowField {
   bool IsUsable() const;
   Eigen::Vector2f At(const Eigen::Vector2f& pixel) const;
 
-  // How far true vectors lie from the field: three times what 19 of 20 anchors deviate at most from the
-  // field of the others. Infinite if the field is not usable.
+  // How far true vectors lie from the field: three times what 19 of 20 anchors deviate at most from
+  // the field of the others. Infinite if the field is not usable.
   float Radius() const { return radius_; }
 
  private:

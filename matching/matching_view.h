@@ -12,6 +12,8 @@ namespace vgtw {
 // A view made ready for being matched with several others.
 class MatchingView {
  public:
+  // Throws std::invalid_argument if there is not a descriptor per keypoint or the camera has no
+  // size.
   explicit MatchingView(ViewFeatures features);
   MatchingView(const MatchingView&) = delete;
   MatchingView& operator=(const MatchingView&) = delete;

@@ -52,13 +52,14 @@ FeatureMatches MutualMatches(const MatchingView& view1,
   for (size_t k = 0; k < idxs1.size(); ++k) {
     const Nearest& found = nearest1[k];
     if (found.idx == kNone || nearest2[found.idx].idx != idxs1[k]) continue;
-    if (found.distance > max_ratio2 * found.second_distance ||
-        found.distance > max_ratio2 * nearest2[found.idx].second_distance) {
+    // Not nearer also where both are 0: exact copies.
+    if (found.distance >= max_ratio2 * found.second_distance ||
+        found.distance >= max_ratio2 * nearest2[found.idx].second_distance) {
       continue;
     }
     const float background =
         std::min(view1.BackgroundDistance(idxs1[k]), view2.BackgroundDistance(found.idx));
-    if (found.distance > max_background_ratio2 * background) continue;
+    if (found.distance >= max_background_ratio2 * background) continue;
     matches.push_back({idxs1[k], found.idx});
   }
   std::sort(matches.begin(), matches.end());
