@@ -15,6 +15,9 @@ constexpr double kMinRadiusPx = 3.0;
 // Where no depth is known, points nearer than this times the baseline are not expected.
 constexpr double kMinDepthPerBaseline = 0.5;
 constexpr double kFarthestPerBaseline = 1e4;
+// A lens bends the image of a ray: by how much shows in its middle and its quarters, which inverse
+// depth divides evenly.
+constexpr double kPlacesOfBow[] = {0.25, 0.5, 0.75};
 
 }  // namespace
 
@@ -40,7 +43,9 @@ WindowPredictor::WindowPredictor(const ViewFeatures& view1,
     if (std::isfinite(depth)) depths.push_back(depth);
   }
   if (depths.empty()) {
-    const double baseline = cam2_from_cam1_.translation.norm();
+    // The baseline may be as long as its uncertainty; without any all depths look alike.
+    const double longest = std::max(cam2_from_cam1_.translation.norm(), uncertainty.centre);
+    const double baseline = longest > 0.0 ? longest : 1.0;
     known_depths_ = {kMinDepthPerBaseline * baseline, kFarthestPerBaseline * baseline};
   } else {
     const double margin = std::exp(num_sigmas * uncertainty.depth);
@@ -76,6 +81,18 @@ double WindowPredictor::Radius(const Eigen::Vector2d& pixel1,
   return std::max(kMinRadiusPx, num_sigmas_ * errors.norm());
 }
 
+float WindowPredictor::Bow(const Eigen::Vector3d& ray,
+                           const DepthRange& range,
+                           const Capsule& axis) const {
+  float bow2 = 0.0f;
+  for (const double share : kPlacesOfBow) {
+    const double depth = 1.0 / ((1.0 - share) / range.nearest + share / range.farthest);
+    const auto pixel = Project(camera2_, cam2_from_cam1_ * (depth * ray));
+    if (pixel) bow2 = std::max(bow2, axis.SquaredDistanceToAxis(pixel->cast<float>()));
+  }
+  return std::sqrt(bow2);
+}
+
 bool WindowPredictor::IsOutside(const Capsule& capsule) const {
   const Eigen::Array2f lowest = capsule.start.cwiseMin(capsule.end).array() - capsule.radius;
   const Eigen::Array2f highest = capsule.start.cwiseMax(capsule.end).array() + capsule.radius;
@@ -103,9 +120,8 @@ std::optional<SearchWindow> WindowPredictor::WindowOf(size_t idx1) const {
   window.capsule = {nearest->cast<float>(), farthest->cast<float>(), 0.0f};
   window.centre = centre->cast<float>();
   const Eigen::Vector2d pixel1 = view1_.pixels[idx1].cast<double>();
-  // A lens bends the image of the ray: by how much shows in its middle.
-  const float bow = std::sqrt(window.capsule.SquaredDistanceToAxis(window.centre));
-  window.capsule.radius = bow + static_cast<float>(Radius(pixel1, *centre, point_in_cam2));
+  window.capsule.radius =
+      Bow(ray, *range, window.capsule) + static_cast<float>(Radius(pixel1, *centre, point_in_cam2));
   if (!std::isfinite(window.capsule.radius) || IsOutside(window.capsule)) return std::nullopt;
   if (has_depth) {
     window.scale_ratio = static_cast<float>(camera2_.MeanFocalLength() / point_in_cam2.z() * depth /

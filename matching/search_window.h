@@ -49,6 +49,8 @@ class WindowPredictor {
   double Radius(const Eigen::Vector2d& pixel1,
                 const Eigen::Vector2d& pixel2,
                 const Eigen::Vector3d& point_in_cam2) const;
+  // How far the image of the ray leaves the axis, in pixels.
+  float Bow(const Eigen::Vector3d& ray, const DepthRange& range, const Capsule& axis) const;
   bool IsOutside(const Capsule& capsule) const;
 
   const ViewFeatures& view1_;
