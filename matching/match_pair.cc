@@ -18,7 +18,7 @@ namespace {
 // Verified matches reach to 1 in their windows; if the outer ones come near, others were cut off.
 constexpr double kCrowdedShare = 0.75;
 // So many times the least number of inliers are no accident, nor a corner of what there is.
-constexpr int kMinSureFactor = 4;
+constexpr size_t kMinSureFactor = 4;
 // Fine passes go on while each finds so many times what the last one did.
 constexpr double kMinGrowth = 1.1;
 constexpr int kMaxFinePasses = 4;
@@ -27,9 +27,9 @@ constexpr float kMaxFineRadiusShare = 0.1f;  // of the longest side
 
 size_t NumInliers(const MatchedPair& pair) { return pair.geometry.inlier_matches.size(); }
 
-std::span<const uint32_t> LargestFeatures(const MatchingView& view, int count) {
+std::span<const uint32_t> LargestFeatures(const MatchingView& view, size_t count) {
   const std::vector<uint32_t>& idxs = view.idxs_by_scale();
-  return std::span(idxs).first(std::min(idxs.size(), static_cast<size_t>(count)));
+  return std::span(idxs).first(std::min(idxs.size(), count));
 }
 
 std::optional<RelativePoseError> ErrorOfPrediction(const MatchingView& view1,
@@ -95,7 +95,7 @@ MatchedPair PairMatcher::SearchOnce(double num_sigmas) const {
   return Verified(SearchWindows(
                       view1_,
                       view2_,
-                      LargestFeatures(view1_, options_.num_coarse_features),
+                      LargestFeatures(view1_, static_cast<size_t>(options_.num_coarse_features)),
                       [&](uint32_t idx1) { return predictor.WindowOf(idx1); },
                       {},
                       options_.search),
@@ -117,23 +117,28 @@ bool PairMatcher::IsCrowded(const MatchedPair& pair, double num_sigmas) const {
 }
 
 MatchedPair PairMatcher::Coarse() const {
-  const auto min_num_sure = static_cast<size_t>(kMinSureFactor * options_.two_view.min_num_inliers);
+  const size_t min_num_sure =
+      kMinSureFactor * static_cast<size_t>(options_.two_view.min_num_inliers);
   MatchedPair best;
-  double num_sigmas = options_.num_sigmas;
-  for (int i = 0; i <= options_.max_num_widenings; ++i, num_sigmas *= 2.0) {
+  for (int i = std::min(options_.min_num_widenings, options_.max_num_widenings);
+       i <= options_.max_num_widenings;
+       ++i) {
+    const double num_sigmas = options_.num_sigmas * std::exp2(i);
     MatchedPair pair = SearchOnce(num_sigmas);
     if (NumInliers(pair) <= NumInliers(best)) continue;
     best = std::move(pair);
+    best.num_widenings = i;
     if (i > 0) best.method = MatchMethod::kWidened;
     if (NumInliers(best) >= min_num_sure && !IsCrowded(best, num_sigmas)) return best;
   }
-  MatchedPair unguided =
-      Verified(SearchAll(view1_,
-                         view2_,
-                         LargestFeatures(view1_, options_.num_coarse_features),
-                         LargestFeatures(view2_, 2 * options_.num_coarse_features),
-                         options_.search),
-               MatchMethod::kUnguided);
+  MatchedPair unguided = Verified(
+      SearchAll(view1_,
+                view2_,
+                LargestFeatures(view1_, static_cast<size_t>(options_.num_coarse_features)),
+                LargestFeatures(view2_, 2 * static_cast<size_t>(options_.num_coarse_features)),
+                options_.search),
+      MatchMethod::kUnguided);
+  unguided.num_widenings = options_.max_num_widenings;
   return NumInliers(unguided) > NumInliers(best) ? unguided : best;
 }
 
@@ -209,6 +214,7 @@ MatchedPair PairMatcher::Fine(const MatchedPair& coarse) const {
                                   OnEpipolarLine(coarse.geometry),
                                   options_.search),
                               coarse.method);
+  fine.num_widenings = coarse.num_widenings;
   fine.window_radius_px =
       ClampedRadius(std::min(flow.from_prediction.Radius(), flow.from_pixel.Radius()));
   return fine;
@@ -221,6 +227,8 @@ void MatchPairOptions::Check() const {
   search.Check();
   two_view.Check();
   VGTW_CHECK(num_sigmas > 0.0 && std::isfinite(num_sigmas), "MatchPairOptions::num_sigmas");
+  VGTW_CHECK(min_num_widenings >= 0 && min_num_widenings <= 16,
+             "MatchPairOptions::min_num_widenings");
   VGTW_CHECK(max_num_widenings >= 0 && max_num_widenings <= 16,
              "MatchPairOptions::max_num_widenings");
   VGTW_CHECK(num_coarse_features >= 1, "MatchPairOptions::num_coarse_features");

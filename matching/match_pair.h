@@ -16,7 +16,9 @@ struct MatchPairOptions {
   PredictionUncertainty uncertainty;
   // Windows reach so many standard deviations; > 0.
   double num_sigmas = 2.0;
-  // Windows that proved too small are doubled, up to so many times; >= 0.
+  // Windows are doubled so many times to begin with, and where they prove too small, up to so many
+  // times in all; both in [0, 16].
+  int min_num_widenings = 0;
   int max_num_widenings = 2;
   // Features, the largest first, that find out how wrong the prediction is; >= 1.
   int num_coarse_features = 1500;
@@ -46,6 +48,7 @@ struct MatchedPair {
   FeatureMatches matches;    // before verification
   TwoViewGeometry geometry;  // measured; the prediction only told where to look
   std::optional<RelativePoseError> prediction_error;
+  int num_widenings = 0;          // of the windows of the prediction
   float window_radius_px = 0.0f;  // of the last search
 };
 

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What benchmarks of the whole program need beside it:
+//   scene_tool render FOLDER NUM_VIEWS PATH      photos/, masks/, truth/ (a predictions folder) of
+//                                                the synthetic scene; PATH: orbit, forward, grid
+//   scene_tool perturb PREDICTIONS OUTPUT ROTATION_DEG CENTRE_% FOCAL_% DEPTH_% SEED
+//                                                the same predictions with errors
+//   scene_tool error MODEL PREDICTIONS           poses of a COLMAP model against predictions, JSON
+#include "bridge/colmap_model.h"
+#include "bridge/mask_files.h"
+#include "bridge/predictions.h"
+#include "evaluation/pose_error.h"
+#include "scene/error.h"
+#include "scene/parallel.h"
+#include "scene/perturb.h"
+#include "scene/synthetic.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace vgtw {
+namespace {
+
+namespace fs = std::filesystem;
+
+void Render(const fs::path& folder, int num_views, const std::string& path) {
+  SyntheticOptions options;
+  options.path = path == "forward" ? CameraPath::kForward
+                 : path == "grid"  ? CameraPath::kGrid
+                                   : CameraPath::kOrbit;
+  options.num_views = num_views;
+  options.path_extent_deg = 300.0;
+  options.width = 800;
+  options.height = 600;
+  const SyntheticScene scene(options);
+  ParallelFor(num_views, 0, [&](int64_t i) {
+    const auto idx = static_cast<size_t>(i);
+    const SyntheticView view = scene.Render(idx);
+    const std::string& name = scene.views()[idx].name;
+    WriteImage(folder / "photos" / name, view.image);
+    StaticMask mask(view.distractor.width(), view.distractor.height(), 255);
+    for (size_t k = 0; k < mask.size(); ++k) {
+      if (view.distractor.data()[k] > 0.5f) mask.data()[k] = 0;
+    }
+    WriteImage(MaskPath(folder / "masks", name), mask);
+  });
+  WritePrediction(MakeTruePrediction(scene), folder / "truth", /*overwrite=*/false);
+}
+
+void PerturbFolder(char** args) {
+  PerturbOptions options;
+  options.rotation_deg = std::atof(args[2]);
+  options.centre_percent = std::atof(args[3]);
+  options.focal_percent = std::atof(args[4]);
+  options.depth_scale_percent = options.depth_noise_percent = std::atof(args[5]);
+  options.seed = std::strtoull(args[6], nullptr, 10);
+  WritePrediction(Perturb(ReadPrediction(args[0]), options), args[1], /*overwrite=*/false);
+}
+
+void PrintError(const fs::path& model, const fs::path& predictions) {
+  std::map<std::string, Rigid3d> reference;
+  const PredictionReader reader(predictions);
+  for (const View& view : reader.views()) {
+    reference[view.name] = view.cam_from_world;
+  }
+  const auto estimate = CamFromWorldByName(ReadModel(model));
+  const auto comparison = ComparePoses(estimate, reference);
+  if (!comparison) throw Error(model.string() + ": too few poses to compare");
+  std::printf("{\"num_images\": %zu, \"centre_rmse_percent\": %.4f, \"rotation_deg\": %.4f}\n",
+              estimate.size(),
+              comparison->centre_rmse_percent,
+              comparison->relative_rotation_median_deg);
+}
+
+int Main(int argc, char** argv) {
+  const std::string verb = argc > 1 ? argv[1] : "";
+  try {
+    if (verb == "render" && argc == 5) {
+      Render(argv[2], std::atoi(argv[3]), argv[4]);
+    } else if (verb == "perturb" && argc == 9) {
+      PerturbFolder(argv + 2);
+    } else if (verb == "error" && argc == 4) {
+      PrintError(argv[2], argv[3]);
+    } else {
+      std::fprintf(stderr, "see the head of tests/benchmarks/scene_tool.cc\n");
+      return 2;
+    }
+  } catch (const Error& error) {
+    std::fprintf(stderr, "scene_tool: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace vgtw
+
+int main(int argc, char** argv) { return vgtw::Main(argc, argv); }
