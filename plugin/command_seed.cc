@@ -5,9 +5,12 @@
 #include "bridge/seed.h"
 #include "plugin/commands.h"
 #include "plugin/table.h"
+#include "plugin/track_stage.h"
 #include "scene/error.h"
+#include "scene/reprojection.h"
 
 #include <memory>
+#include <optional>
 
 namespace vgtw {
 namespace {
@@ -20,6 +23,7 @@ struct SeedCommand {
   std::filesystem::path pcd_path;
   std::string output_type = "BIN";
   SeedOptions options;
+  bool with_tracks = false;
   bool overwrite = false;
   Usability usability;
 
@@ -27,11 +31,17 @@ struct SeedCommand {
     Apply(usability);
     options.num_threads = usability.num_threads;
     const PredictionReader predictions(predictions_path);
-    const Seed seed = database_path.empty()
-                          ? MakeSeed(predictions, options)
-                          : MakeSeed(predictions,
-                                     ColmapDatabase(database_path, ColmapDatabase::Mode::kReadOnly),
-                                     options);
+    if (with_tracks && database_path.empty()) {
+      throw Error("--tracks takes the matches of a database, expected --database_path");
+    }
+    options.with_points = options.with_points && !with_tracks;
+    std::optional<ColmapDatabase> database;
+    if (!database_path.empty()) {
+      database.emplace(database_path, ColmapDatabase::Mode::kReadOnly);
+    }
+    Seed seed =
+        database ? MakeSeed(predictions, *database, options) : MakeSeed(predictions, options);
+    if (with_tracks) AddTracks(predictions, *database, seed);
     WriteModelOptions write;
     write.format = output_type == "TXT" ? ModelFormat::kText : ModelFormat::kBinary;
     write.overwrite = overwrite;
@@ -39,6 +49,18 @@ struct SeedCommand {
     if (!ply_path.empty()) WritePly(ply_path, PointsOf(seed.reconstruction));
     if (!pcd_path.empty()) WritePcd(pcd_path, PointsOf(seed.reconstruction));
     Finish(usability, Text(seed), Json(seed));
+  }
+
+  void AddTracks(const PredictionReader& predictions,
+                 const ColmapDatabase& database,
+                 Seed& seed) const {
+    TrackStageOptions tracks;
+    tracks.distractor_threshold = options.distractor_threshold;
+    tracks.num_threads = options.num_threads;
+    AddLiftedTracks(predictions, database, tracks, seed.reconstruction);
+    const ReprojectionStats stats = ComputeReprojectionStats(seed.reconstruction);
+    seed.summary.num_points3D = stats.num_points3D;
+    seed.summary.mean_track_length = stats.mean_track_length;
   }
 
   std::string Text(const Seed& seed) const {
@@ -81,6 +103,9 @@ std::function<void()> DeclareSeed(Flags& flags) {
   flags.Group("Algorithm")
       .Add("shared_camera", &options.shared_camera, "One camera for all photos of a size")
       .Add("points", &options.with_points, "3D points from confident static depth")
+      .Add("tracks",
+           &command->with_tracks,
+           "Instead, the database's verified matches as points, placed by depth")
       .Add("keep_percent",
            &options.keep_percent,
            "Share of depth pixels kept, by confidence over all views, percent")

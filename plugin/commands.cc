@@ -63,6 +63,12 @@ const std::vector<Command>& Commands() {
        DeclareMaskVote,
        "  vgtw mask vote --predictions_path predictions/ --output_path voted/\n"
        "  vgtw mask make --predictions_path voted/ --output_path masks/"},
+      {"match",
+       "Photos or a database, and predictions -> database with matches",
+       DeclareMatch,
+       "  vgtw match --image_path photos/ --mask_path masks/ --predictions_path predictions/ "
+       "--output_path a.db\n"
+       "  vgtw match --database_path a.db --predictions_path predictions/ --output_path b.db"},
       {"seed",
        "Predictions (and database) -> COLMAP model",
        DeclareSeed,

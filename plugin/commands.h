@@ -25,6 +25,7 @@ std::function<void()> DeclareMaskRestore(Flags& flags);
 std::function<void()> DeclareMaskScore(Flags& flags);
 std::function<void()> DeclareMaskUndistort(Flags& flags);
 std::function<void()> DeclareMaskVote(Flags& flags);
+std::function<void()> DeclareMatch(Flags& flags);
 std::function<void()> DeclareRun(Flags& flags);
 std::function<void()> DeclareSeed(Flags& flags);
 

@@ -8,6 +8,7 @@
 #include "bridge/point_cloud.h"
 #include "bridge/predictions.h"
 #include "plugin/colmap.h"
+#include "plugin/feature_stage.h"
 #include "plugin/hashing.h"
 #include "plugin/progress.h"
 #include "plugin/refine_rounds.h"
@@ -54,8 +55,10 @@ class Pipeline {
   void RecordInputs();
   void MakeMasks();
   void ExtractFeatures();
+  std::string ExtractByColmap(const fs::path& database_path);
   json CheckFeatures(const fs::path& database_path, const std::string& last_words) const;
   void MatchFeatures();
+  json MatchByColmap();
   void Refine();
   PipelineReport Report();
 
@@ -144,35 +147,47 @@ void Pipeline::ExtractFeatures() {
                        {"use_masks", options_.use_masks}};
   workspace_.RunStage("features", inputs, workspace_.database(), [&] {
     const fs::path database_path = workspace_.Scratch("features") / "database.db";
+    std::string last_words;
     {
       ColmapDatabase database = ColmapDatabase::Create(database_path);
       SeedOptions seed;
       seed.shared_camera = options_.shared_camera;
       seed.camera_model = options_.camera_model;
       WriteSeedCameras(predictions_, options_.image_path, seed, database);
+      if (options_.matcher == Matcher::kGuided) {
+        FeatureStageOptions features;
+        features.image_path = options_.image_path;
+        if (options_.use_masks) features.mask_path = workspace_.masks();
+        features.extract.sift = options_.sift;
+        features.extract.num_threads = options_.num_threads;
+        ExtractDatabaseFeatures(features, database);
+      }
     }
-    ColmapOptions arguments = {
-        {"database_path", database_path},
-        {"image_path", options_.image_path},
-        {"SiftExtraction.use_gpu", options_.use_gpu ? "1" : "0"},
-        {"SiftExtraction.num_threads", ThreadsOrAll()},
-        {"SiftExtraction.max_num_features", std::to_string(options_.max_num_features)},
-        {"SiftExtraction.max_image_size", std::to_string(options_.max_image_size)}};
-    const fs::path image_list = workspace_.Scratch("image_list") / "names.txt";
-    WriteFileAtomically(image_list, JoinLines(image_names_));
-    arguments.emplace_back("image_list_path", image_list);
-    if (options_.use_masks) arguments.emplace_back("ImageReader.mask_path", workspace_.masks());
-    ProgressDisplay display("features");
-    std::string last_words;
-    colmap_.Run("feature_extractor",
-                arguments,
-                workspace_.log("features"),
-                display.Callback(),
-                &last_words);
+    if (options_.matcher != Matcher::kGuided) last_words = ExtractByColmap(database_path);
     const json result = CheckFeatures(database_path, last_words);
     fs::rename(database_path, workspace_.database());
     return result;
   });
+}
+
+// Returns what colmap said last.
+std::string Pipeline::ExtractByColmap(const fs::path& database_path) {
+  ColmapOptions arguments = {
+      {"database_path", database_path},
+      {"image_path", options_.image_path},
+      {"SiftExtraction.use_gpu", options_.use_gpu ? "1" : "0"},
+      {"SiftExtraction.num_threads", ThreadsOrAll()},
+      {"SiftExtraction.max_num_features", std::to_string(options_.sift.max_num_features)},
+      {"SiftExtraction.max_image_size", std::to_string(options_.sift.max_image_size)}};
+  const fs::path image_list = workspace_.Scratch("image_list") / "names.txt";
+  WriteFileAtomically(image_list, JoinLines(image_names_));
+  arguments.emplace_back("image_list_path", image_list);
+  if (options_.use_masks) arguments.emplace_back("ImageReader.mask_path", workspace_.masks());
+  ProgressDisplay display("features");
+  std::string last_words;
+  colmap_.Run(
+      "feature_extractor", arguments, workspace_.log("features"), display.Callback(), &last_words);
+  return last_words;
 }
 
 // The extractor's exit code says nothing: count what it left, also inside the masks.
@@ -206,38 +221,46 @@ json Pipeline::CheckFeatures(const fs::path& database_path, const std::string& l
 void Pipeline::MatchFeatures() {
   const json inputs = {{"options", OptionsAsJson(options_)["matches"]}};
   workspace_.RunStage("matches", inputs, workspace_.database(), [&] {
-    {
-      ColmapDatabase database(workspace_.database(), ColmapDatabase::Mode::kReadWrite);
-      ColmapDatabase::Transaction transaction(database);
-      database.ClearMatches();
-      transaction.Commit();
-    }
-    ColmapOptions arguments = {{"database_path", workspace_.database()},
-                               {"SiftMatching.use_gpu", options_.use_gpu ? "1" : "0"},
-                               {"SiftMatching.num_threads", ThreadsOrAll()}};
-    const bool is_sequential = options_.matcher == Matcher::kSequential;
-    if (is_sequential) {
-      arguments.emplace_back("SequentialMatching.overlap",
-                             std::to_string(options_.sequential_overlap));
-    }
-    ProgressDisplay display("matches");
-    std::string last_words;
-    colmap_.Run(is_sequential ? "sequential_matcher" : "exhaustive_matcher",
-                arguments,
-                workspace_.log("matches"),
-                display.Callback(),
-                &last_words);
-    const size_t num_pairs = ColmapDatabase(workspace_.database(), ColmapDatabase::Mode::kReadOnly)
-                                 .ReadTwoViewPairs()
-                                 .size();
-    if (num_pairs == 0) {
-      Fail(workspace_.database(),
-           "no pair of photos has verified matches",
-           "at least one",
-           "the photos may not overlap; colmap said: " + last_words);
-    }
-    return json{{"num_verified_pairs", num_pairs}};
+    if (options_.matcher != Matcher::kGuided) return MatchByColmap();
+    MatchStageOptions match = options_.match;
+    match.num_threads = options_.num_threads;
+    ColmapDatabase database(workspace_.database(), ColmapDatabase::Mode::kReadWrite);
+    return AsJson(MatchDatabase(predictions_, match, database));
   });
+}
+
+json Pipeline::MatchByColmap() {
+  {
+    ColmapDatabase database(workspace_.database(), ColmapDatabase::Mode::kReadWrite);
+    ColmapDatabase::Transaction transaction(database);
+    database.ClearMatches();
+    transaction.Commit();
+  }
+  ColmapOptions arguments = {{"database_path", workspace_.database()},
+                             {"SiftMatching.use_gpu", options_.use_gpu ? "1" : "0"},
+                             {"SiftMatching.num_threads", ThreadsOrAll()}};
+  const bool is_sequential = options_.matcher == Matcher::kSequential;
+  if (is_sequential) {
+    arguments.emplace_back("SequentialMatching.overlap",
+                           std::to_string(options_.sequential_overlap));
+  }
+  ProgressDisplay display("matches");
+  std::string last_words;
+  colmap_.Run(is_sequential ? "sequential_matcher" : "exhaustive_matcher",
+              arguments,
+              workspace_.log("matches"),
+              display.Callback(),
+              &last_words);
+  const size_t num_pairs = ColmapDatabase(workspace_.database(), ColmapDatabase::Mode::kReadOnly)
+                               .ReadTwoViewPairs()
+                               .size();
+  if (num_pairs == 0) {
+    Fail(workspace_.database(),
+         "no pair of photos has verified matches",
+         "at least one",
+         "the photos may not overlap; colmap said: " + last_words);
+  }
+  return {{"num_verified_pairs", num_pairs}};
 }
 
 void Pipeline::Refine() {
@@ -286,6 +309,18 @@ PipelineReport Pipeline::Report() {
 }
 
 }  // namespace
+
+std::string_view Name(Matcher matcher) {
+  switch (matcher) {
+    case Matcher::kColmap:
+      return "colmap";
+    case Matcher::kSequential:
+      return "sequential";
+    case Matcher::kGuided:
+      break;
+  }
+  return "guided";
+}
 
 PipelineReport RunPipeline(const PipelineOptions& options) { return Pipeline(options).Run(); }
 

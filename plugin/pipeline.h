@@ -3,17 +3,25 @@
 
 #include "bridge/seed.h"
 #include "evaluation/pose_error.h"
+#include "matching/sift.h"
+#include "plugin/match_stage.h"
 #include "scene/distractor_mask.h"
 #include "scene/reprojection.h"
 
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace vgtw {
 
-enum class Matcher { kExhaustive, kSequential };
+enum class Matcher {
+  kGuided,     // our features, matched where the predictions put them
+  kColmap,     // colmap's features, its exhaustive matcher
+  kSequential  // colmap's features, its matcher for sequences
+};
+std::string_view Name(Matcher matcher);
 
 struct PipelineOptions {
   std::filesystem::path image_path;
@@ -26,10 +34,10 @@ struct PipelineOptions {
   bool use_masks = true;
   StaticMaskOptions mask;
 
-  Matcher matcher = Matcher::kExhaustive;
+  Matcher matcher = Matcher::kGuided;
   int sequential_overlap = 10;  // images before and after, kSequential
-  int max_num_features = 8192;  // per image
-  int max_image_size = 3200;    // pixels; larger images are reduced for extraction
+  SiftOptions sift;             // colmap's features obey its two limits only
+  MatchStageOptions match;      // kGuided
   bool use_gpu = false;         // for colmap's SIFT
   // For photos that were predicted as pinholes; refinement then finds the lens' distortion.
   CameraModel camera_model = CameraModel::kSimpleRadial;
@@ -68,8 +76,8 @@ struct PipelineReport {
 };
 
 // Photos and predictions to a COLMAP reconstruction of the static scene:
-//   masks -> features -> matches (real colmap) -> feedforward: triangulated with the predicted
-//   poses (real colmap) -> refined: rounds of triangulation and robust bundle adjustment.
+//   masks -> features -> matches (ours or by the real colmap) -> feedforward: triangulated with the
+//   predicted poses (real colmap) -> refined: rounds of triangulation and robust bundle adjustment.
 // Stages that are up to date are skipped. Throws Error if a stage leaves nothing to go on with.
 PipelineReport RunPipeline(const PipelineOptions& options);
 

@@ -5,13 +5,16 @@ namespace vgtw {
 
 void RunFlags::Declare(Flags& flags) {
   mask_.Declare(flags);
-  flags.Group("Features and matches (colmap)")
+  flags.Group("Features and matches")
       .Add("colmap", &options_.colmap, "The colmap executable; empty = the one on PATH")
-      .AddChoice("matcher", &matcher_, {"exhaustive", "sequential"}, "Which pairs are matched")
+      .AddChoice("matcher",
+                 &matcher_,
+                 {"guided", "colmap", "sequential"},
+                 "guided = our SIFT, matched where the predictions put it; colmap = its SIFT and "
+                 "exhaustive matcher; sequential = its SIFT and sequential matcher")
       .Add("sequential_overlap", &options_.sequential_overlap, "Neighbours of a sequence")
-      .Add("max_num_features", &options_.max_num_features, "Features per photo")
-      .Add("max_image_size", &options_.max_image_size, "Larger photos are reduced, pixels")
       .Add("use_gpu", &options_.use_gpu, "Let colmap use its GPU code");
+  match_.Declare(flags);
   flags.Group("Refinement")
       .AddChoice("camera_model",
                  &camera_model_,
@@ -32,10 +35,11 @@ void RunFlags::Declare(Flags& flags) {
 void RunFlags::ApplyTo(PipelineOptions& options) const {
   options.mask = mask_.Options();
   options.colmap = options_.colmap;
-  options.matcher = matcher_ == "sequential" ? Matcher::kSequential : Matcher::kExhaustive;
+  options.matcher = matcher_ == "colmap"       ? Matcher::kColmap
+                    : matcher_ == "sequential" ? Matcher::kSequential
+                                               : Matcher::kGuided;
   options.sequential_overlap = options_.sequential_overlap;
-  options.max_num_features = options_.max_num_features;
-  options.max_image_size = options_.max_image_size;
+  match_.ApplyTo(options.sift, options.match);
   options.use_gpu = options_.use_gpu;
   options.camera_model = *FindCameraModel(camera_model_);
   options.shared_camera = options_.shared_camera;

@@ -3,6 +3,7 @@
 
 #include "plugin/flags.h"
 #include "plugin/mask_flags.h"
+#include "plugin/match_flags.h"
 #include "plugin/pipeline.h"
 
 #include <string>
@@ -18,8 +19,9 @@ class RunFlags {
 
  private:
   MaskFlags mask_;
+  MatchFlags match_;
   PipelineOptions options_;
-  std::string matcher_ = "exhaustive";
+  std::string matcher_ = "guided";
   std::string camera_model_ = "SIMPLE_RADIAL";
 };
 
