@@ -19,6 +19,7 @@ constexpr int kConfigCalibrated = 2;
 constexpr int kConfigUncalibrated = 3;
 constexpr int kConfigPlanar = 4;
 constexpr int kConfigPanoramic = 5;
+constexpr int kMaxNumRefinements = 5;
 
 // Matches in both units, as the estimators want them.
 struct Correspondences {
@@ -37,6 +38,7 @@ Correspondences Collect(const ViewFeatures& view1,
   result.focal_length =
       0.5 * (view1.view.camera.MeanFocalLength() + view2.view.camera.MeanFocalLength());
   for (const auto& match : matches) {
+    VGTW_CHECK(match[0] < view1.size() && match[1] < view2.size(), "matches of other views");
     const RayPair pair = {view1.rays[match[0]].cast<double>(), view2.rays[match[1]].cast<double>()};
     if (!pair.ray1.allFinite() || !pair.ray2.allFinite()) continue;
     result.matches.push_back(match);
@@ -105,6 +107,17 @@ std::vector<RayPair> InliersOf(const Estimate& estimate, const Correspondences& 
   return inliers;
 }
 
+// How well a pose explains the correspondences: each counts the less the farther it is off. The
+// number of inliers would prefer a worse pose that one more wrong match happens to fulfil.
+double MsacScore(const Eigen::Matrix3d& E, const Correspondences& all, double max_error_px) {
+  double score = 0.0;
+  for (const RayPair& pair : all.rays) {
+    const double error = SampsonDistance(E, pair.ray1, pair.ray2) * all.focal_length / max_error_px;
+    score += std::max(0.0, 1.0 - error * error);
+  }
+  return score;
+}
+
 // Sampled, then refined on its inliers; fills the pose.
 Estimate EstimateEssential(const Correspondences& all,
                            const TwoViewOptions& options,
@@ -135,14 +148,20 @@ Estimate EstimateEssential(const Correspondences& all,
     });
   };
   count(*sampled);
-  const Estimate before = estimate;
-  const std::vector<RayPair> inliers = InliersOf(estimate, all);
-  cam2_from_cam1 = RelativePoseFromEssential(*sampled, inliers);
-  const Rigid3d refined =
-      RefineRelativePose(inliers, 0.25 * options.max_error_px / all.focal_length, cam2_from_cam1);
-  count(EssentialMatrix(refined));
-  if (estimate.num_inliers < before.num_inliers) return before;
-  cam2_from_cam1 = refined;
+  cam2_from_cam1 = RelativePoseFromEssential(*sampled, InliersOf(estimate, all));
+  const double scale = 0.25 * options.max_error_px / all.focal_length;
+  // The inliers of a sample are those near a pose that is a little wrong.
+  for (int i = 0; i < kMaxNumRefinements; ++i) {
+    const Estimate before = estimate;
+    const Rigid3d refined = RefineRelativePose(InliersOf(estimate, all), scale, cam2_from_cam1);
+    count(EssentialMatrix(refined));
+    if (MsacScore(estimate.matrix, all, options.max_error_px) <
+        MsacScore(before.matrix, all, options.max_error_px)) {
+      return before;
+    }
+    cam2_from_cam1 = refined;
+    if (estimate.is_inlier == before.is_inlier) break;
+  }
   return estimate;
 }
 
@@ -199,7 +218,7 @@ bool IsPanoramic(const Estimate& homography,
 }  // namespace
 
 void TwoViewOptions::Check() const {
-  VGTW_CHECK(max_error_px > 0.0, "TwoViewOptions::max_error_px");
+  VGTW_CHECK(max_error_px > 0.0 && std::isfinite(max_error_px), "TwoViewOptions::max_error_px");
   VGTW_CHECK(min_num_inliers >= 5, "TwoViewOptions::min_num_inliers");
   VGTW_CHECK(min_E_F_inlier_ratio >= 0.0 && min_E_F_inlier_ratio <= 1.0,
              "TwoViewOptions::min_E_F_inlier_ratio");
