@@ -22,6 +22,11 @@ constexpr double kFinalMaxErrorPx = 4.0;
 // Feed-forward rotations are within a degree or two: this far off a true match may reproject.
 constexpr double kSeedMaxErrorDeg = 2.5;
 
+// Relative decrease of the cost per iteration at which an adjustment ends. What lies in the slow
+// valley of focal length against depth is left to the last one.
+constexpr double kCoarseTolerance = 1e-4;
+constexpr double kFineTolerance = 1e-7;
+
 // Pixels that an angle spans at the image centre of the longest lens.
 double PixelsOfAngle(const Reconstruction& model, double angle_deg) {
   double focal_length = 0.0;
@@ -71,15 +76,22 @@ void CopyGeometry(const Reconstruction& adjusted, Reconstruction& model) {
   UpdateFrames(model);
 }
 
+// How one adjustment of a round goes about it.
+struct Pass {
+  bool refine_extra_params = false;
+  double max_error_px = 0.0;  // of observations that stay
+  double function_tolerance = 0.0;
+};
+
 // One robust adjustment at the scale of the model's own error, then a filter.
 BundleAdjustmentSummary AdjustAndFilter(const RefineRoundsOptions& options,
                                         const std::set<ImageId>& held,
-                                        bool refine_extra_params,
-                                        double max_error_px,
+                                        const Pass& pass,
                                         Reconstruction& model) {
   BundleAdjustmentOptions adjustment;
   adjustment.loss_scale_px = std::max(1.0, ComputeReprojectionStats(model).median_px);
-  adjustment.refine_extra_params = refine_extra_params;
+  adjustment.refine_extra_params = pass.refine_extra_params;
+  adjustment.function_tolerance = pass.function_tolerance;
   adjustment.num_threads = options.num_threads;
   std::set<ImageId> left_out = WeakImages(model, options.min_num_observations);
   left_out.insert(held.begin(), held.end());
@@ -87,7 +99,7 @@ BundleAdjustmentSummary AdjustAndFilter(const RefineRoundsOptions& options,
   const BundleAdjustmentSummary summary = AdjustBundle(adjustment, adjusted);
   CopyGeometry(adjusted, model);
   FilterOptions filter;
-  filter.max_reprojection_error_px = max_error_px;
+  filter.max_reprojection_error_px = pass.max_error_px;
   FilterObservations(filter, model);
   return summary;
 }
@@ -110,20 +122,24 @@ void RunRounds(const Colmap& colmap,
       if (!triangulated) return;
       model = std::move(*triangulated);
     }
-    const bool is_last = round + 1 == options.num_rounds;
+    // Limits that are final already cannot become tighter by another round.
+    const bool is_last =
+        round + 1 == options.num_rounds || (round > 0 && max_error_px <= kFinalMaxErrorPx);
     // Twice: the first pass finds the poses, the second sharpens them without what it dropped.
     // Distortion is released once poses are near: before that it would soak up their errors.
-    const bool releases_lens = options.refine_extra_params && round > 0;
-    AdjustAndFilter(options, held, releases_lens, is_last ? kFinalMaxErrorPx : max_error_px, model);
+    Pass pass = {options.refine_extra_params && round > 0,
+                 is_last ? kFinalMaxErrorPx : max_error_px,
+                 kCoarseTolerance};
+    AdjustAndFilter(options, held, pass, model);
     const double median_px = ComputeReprojectionStats(model).median_px;
     max_error_px = std::clamp(6.0 * median_px, kFinalMaxErrorPx, max_error_px);
-    result.rounds.push_back(AdjustAndFilter(options,
-                                            held,
-                                            options.refine_extra_params,
-                                            is_last ? kFinalMaxErrorPx : max_error_px,
-                                            model));
+    pass = {options.refine_extra_params,
+            is_last ? kFinalMaxErrorPx : max_error_px,
+            is_last ? kFineTolerance : kCoarseTolerance};
+    result.rounds.push_back(AdjustAndFilter(options, held, pass, model));
     result.refined = std::move(model);
-    display.Callback()(round + 1, options.num_rounds);
+    display.Callback()(is_last ? options.num_rounds : round + 1, options.num_rounds);
+    if (is_last) break;
   }
 }
 

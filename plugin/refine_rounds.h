@@ -34,7 +34,7 @@ std::optional<Reconstruction> Triangulate(const Colmap& colmap,
 std::map<ImageId, size_t> NumSupportingObservations(const Reconstruction& model);
 
 struct RefineRoundsOptions {
-  int num_rounds = 3;  // >= 1
+  int num_rounds = 3;  // at most; >= 1
   // Views with fewer supporting observations are held at their pose.
   int min_num_observations = 30;
   // So are views that adjustment turns by more than this: feed-forward networks err by a degree or

@@ -24,7 +24,7 @@ void RunFlags::Declare(Flags& flags) {
       .Add("refine_extra_params",
            &options_.refine_extra_params,
            "Refine lens distortion, where the model has it")
-      .Add("num_rounds", &options_.num_refine_rounds, "Triangulate and adjust this often")
+      .Add("num_rounds", &options_.num_refine_rounds, "Triangulate and adjust at most this often")
       .Add("min_num_observations",
            &options_.min_num_observations,
            "A photo with fewer observations of points that three photos see keeps its "

@@ -17,6 +17,9 @@ void BundleAdjustmentOptions::Check() const {
   VGTW_CHECK(max_num_iterations >= 0,
              "BundleAdjustmentOptions::max_num_iterations = " + std::to_string(max_num_iterations) +
                  ", must be >= 0");
+  VGTW_CHECK(function_tolerance >= 0.0 && function_tolerance < 1.0,
+             "BundleAdjustmentOptions::function_tolerance = " + std::to_string(function_tolerance) +
+                 ", must be in [0, 1)");
 }
 
 BundleAdjustmentSummary AdjustBundle(const BundleAdjustmentOptions& options,

@@ -22,6 +22,8 @@ struct BundleAdjustmentOptions {
   bool refine_principal_point = false;
   bool refine_extra_params = false;
   int max_num_iterations = 50;
+  // Done when an iteration lowers the cost by less than this share; in [0, 1).
+  double function_tolerance = 1e-9;
   int num_threads = 0;  // 0 = all cores
   // Called with (iteration, cost) at the start and after each iteration; returning false stops and
   // keeps the best.

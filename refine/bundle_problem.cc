@@ -290,7 +290,7 @@ ceres::Solver::Summary BundleProblem::Solve() {
   options.num_threads = ResolveThreads(options_.num_threads);
   options.max_num_iterations = options_.max_num_iterations;
   // Slow valleys (focal length against depth) lose little cost per step on noisy data.
-  options.function_tolerance = 1e-9;
+  options.function_tolerance = options_.function_tolerance;
   options.parameter_tolerance = 1e-10;
   options.max_num_consecutive_invalid_steps = 20;  // a point met a camera's plane
   options.logging_type = ceres::SILENT;

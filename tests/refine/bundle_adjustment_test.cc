@@ -386,6 +386,9 @@ TEST(AdjustBundle, RefusesWrongOptionsAndBrokenModels) {
   options = {};
   options.max_num_iterations = -1;
   EXPECT_THROW(AdjustBundle(options, reconstruction), std::invalid_argument);
+  options = {};
+  options.function_tolerance = 1.0;
+  EXPECT_THROW(AdjustBundle(options, reconstruction), std::invalid_argument);
   reconstruction.images.at(1).points2D.clear();
   EXPECT_THROW(AdjustBundle({}, reconstruction), std::invalid_argument);
 }
