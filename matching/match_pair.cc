@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "matching/match_pair.h"
 
+#include "matching/epipolar_band.h"
 #include "matching/flow_field.h"
 #include "matching/relative_pose.h"
 #include "scene/error.h"
@@ -23,6 +24,8 @@ constexpr size_t kMinSureFactor = 4;
 constexpr double kMinGrowth = 1.1;
 constexpr int kMaxFinePasses = 4;
 constexpr float kMinFineRadiusPx = 4.0f;
+// In errors of inliers: a band along the epipolar line is smaller than a disc of this radius.
+constexpr double kMinBandLength = 3.0;
 constexpr float kMaxFineRadiusShare = 0.1f;  // of the longest side
 
 size_t NumInliers(const MatchedPair& pair) { return pair.geometry.inlier_matches.size(); }
@@ -54,6 +57,9 @@ std::optional<RelativePoseError> ErrorOfPrediction(const MatchingView& view1,
 struct MatchFlow {
   FlowField from_prediction;
   FlowField from_pixel;
+  // Of the measured geometry; a feature of view 1 has a ray or a pixel there.
+  std::optional<EpipolarBand> band;
+  bool is_band_of_rays = false;
 };
 
 // Two passes over one pair.
@@ -70,6 +76,7 @@ class PairMatcher {
   bool IsCrowded(const MatchedPair& pair, double num_sigmas) const;
   MatchedPair Verified(FeatureMatches matches, MatchMethod method) const;
   MayMatch OnEpipolarLine(const TwoViewGeometry& geometry) const;
+  std::optional<EpipolarBand> BandOf(const TwoViewGeometry& geometry) const;
   std::optional<SearchWindow> FineWindow(const WindowPredictor& predictor,
                                          const MatchFlow& flow,
                                          uint32_t idx1) const;
@@ -166,6 +173,15 @@ MayMatch PairMatcher::OnEpipolarLine(const TwoViewGeometry& geometry) const {
   return {};  // a plane or a turn leaves the epipolar lines open
 }
 
+std::optional<EpipolarBand> PairMatcher::BandOf(const TwoViewGeometry& geometry) const {
+  const double max_error_px = options_.two_view.max_error_px;
+  if (geometry.config == 2) {
+    return EpipolarBand::OfRays(*geometry.E, view2_.features().view.camera, max_error_px);
+  }
+  if (geometry.config == 3) return EpipolarBand::OfPixels(*geometry.F, max_error_px);
+  return std::nullopt;
+}
+
 float PairMatcher::ClampedRadius(float radius_px) const {
   const Camera& camera2 = view2_.features().view.camera;
   const float max_radius_px =
@@ -185,6 +201,12 @@ std::optional<SearchWindow> PairMatcher::FineWindow(const WindowPredictor& predi
   const Eigen::Vector2f centre = (by_depth ? predicted->centre : pixel1) + field.At(pixel1);
   SearchWindow window;
   window.capsule = {centre, centre, ClampedRadius(field.Radius())};
+  if (flow.band && window.capsule.radius > kMinBandLength * options_.two_view.max_error_px) {
+    const Eigen::Vector2f& x1 = flow.is_band_of_rays ? view1_.features().rays[idx1] : pixel1;
+    const auto band = flow.band->Around(centre, window.capsule.radius, x1.cast<double>());
+    if (!band) return std::nullopt;
+    window.capsule = *band;
+  }
   if (predicted) window.scale_ratio = predicted->scale_ratio;
   return window;
 }
@@ -205,7 +227,10 @@ MatchedPair PairMatcher::Fine(const MatchedPair& coarse) const {
       from_prediction.push_back({pixel1, pixel2 - predicted->centre});
     }
   }
-  const MatchFlow flow = {FlowField(std::move(from_prediction)), FlowField(std::move(from_pixel))};
+  const MatchFlow flow = {FlowField(std::move(from_prediction)),
+                          FlowField(std::move(from_pixel)),
+                          BandOf(coarse.geometry),
+                          coarse.geometry.config == 2};
   MatchedPair fine = Verified(SearchWindows(
                                   view1_,
                                   view2_,
