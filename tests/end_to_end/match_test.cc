@@ -6,6 +6,7 @@
 #include "bridge/predictions.h"
 #include "bridge/seed.h"
 #include "scene/perturb.h"
+#include "scene/reprojection.h"
 #include "scene/synthetic.h"
 #include "tests/end_to_end/run_vgtw.h"
 #include "tests/support/temporary_folder.h"
@@ -124,6 +125,33 @@ TEST_F(MatchCommand, RefusesWrongRequestsInOneLine) {
   expect(Match({"--database_path", folder_ / "empty.db", "--in_place"}), "empty.db");
   fs::remove(folder_ / "empty.db");
   EXPECT_EQ(Snapshot(folder_.path()), before);
+}
+
+TEST_F(MatchCommand, SeedPlacesItsMatchesByDepth) {
+  const fs::path path = folder_ / "a.db";
+  ASSERT_EQ(MatchPhotos(path).exit_code, 0);
+  const auto seed = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> args = {"seed", "--predictions_path", folder_ / "predictions"};
+    args.insert(args.end(), more.begin(), more.end());
+    return RunVgtw(args);
+  };
+  const fs::path model_path = folder_ / "seed";
+  const ColmapRun run =
+      seed({"--database_path", path, "--tracks", "--output_path", model_path.string()});
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  const Reconstruction model = ReadModel(model_path);
+  EXPECT_EQ(FindFault(model), "");
+  const ReprojectionStats stats = ComputeReprojectionStats(model);
+  EXPECT_GT(stats.num_points3D, 300u);
+  EXPECT_EQ(stats.num_behind_camera, 0u);
+  // Poses and focal lengths are off by about 0.2 degrees and 2 %, which is 2 and up to 8 pixels.
+  EXPECT_LT(stats.median_px, 5.0);
+  const ColmapDatabase database(path, ColmapDatabase::Mode::kReadOnly);
+  for (const auto& [image_id, image] : model.images) {
+    EXPECT_EQ(image.points2D.size(), database.ReadKeypoints(image_id)->rows);
+  }
+  EXPECT_THAT(seed({"--tracks", "--output_path", folder_ / "other"}).output,
+              HasSubstr("--tracks takes the matches of a database"));
 }
 
 // Both versions triangulate what was matched, with the predicted poses, and the incremental mapper
