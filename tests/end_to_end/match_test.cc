@@ -202,6 +202,29 @@ class MatchedByColmap : public MatchCommand {
   }
 };
 
+// The ways that leave features and matches to COLMAP end at a refined model, too.
+TEST_F(MatchedByColmap, RunKeepsColmapsOwnWays) {
+  VGTW_NEED_COLMAP();
+  for (const std::string matcher : {"colmap", "sequential"}) {
+    const fs::path out = folder_ / matcher;
+    const ColmapRun run = RunVgtw({"run",
+                                   "--image_path",
+                                   folder_ / "photos",
+                                   "--mask_path",
+                                   folder_ / "masks",
+                                   "--predictions_path",
+                                   folder_ / "predictions",
+                                   "--matcher",
+                                   matcher,
+                                   "--output_path",
+                                   out});
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+    EXPECT_THAT(run.output, HasSubstr("colmap feature_extractor"));
+    EXPECT_EQ(ReadJson(out / "run.json")["options"]["matches"]["matcher"], matcher);
+    EXPECT_EQ(ReadModel(out / "sparse" / "refined").images.size(), kNumViews);
+  }
+}
+
 TEST_F(MatchedByColmap, IsTriangulatedAndMapped) {
   VGTW_NEED_COLMAP();
   Triangulate(ColmapExecutable());
