@@ -5,6 +5,10 @@ function(vgtw_compile_options target)
   if(VGTW_SANITIZE)
     target_compile_options(${target} PRIVATE -fsanitize=${VGTW_SANITIZE} -fno-sanitize-recover=all
                                              -fno-omit-frame-pointer)
+    if(VGTW_BUILD_FUZZERS)
+      target_compile_options(${target} PRIVATE
+        -fsanitize-coverage-ignorelist=${PROJECT_SOURCE_DIR}/tests/fuzz/uncovered.txt)
+    endif()
     # Under a sanitizer Eigen would free otherwise than the unsanitized libceres allocates.
     target_compile_definitions(${target} PRIVATE EIGEN_MALLOC_ALREADY_ALIGNED=1)
     target_link_options(${target} PUBLIC -fsanitize=${VGTW_SANITIZE})
