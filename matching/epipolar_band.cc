@@ -55,7 +55,7 @@ std::optional<Capsule> EpipolarBand::Around(const Eigen::Vector2f& expected_pixe
   const Capsule disc = {expected_pixel, expected_pixel, radius_px};
   Eigen::Vector2d expected = expected_pixel.cast<double>();
   double unit = 1.0;  // of x2, per pixel
-  if (camera2_ != nullptr) {
+  if (is_of_rays()) {
     const auto ray = Unproject(*camera2_, expected);
     if (!ray) return disc;
     expected = *ray;
@@ -64,7 +64,7 @@ std::optional<Capsule> EpipolarBand::Around(const Eigen::Vector2f& expected_pixe
   const double max_distance_px = max_error_px_ * OneSidedFactor(matrix_, line, expected);
   auto piece = Clip(line, expected, unit * (radius_px + max_distance_px));
   if (!piece) return std::nullopt;
-  if (camera2_ != nullptr) {
+  if (is_of_rays()) {
     for (Eigen::Vector2d* point : {&piece->start, &piece->foot, &piece->end}) {
       const auto pixel = Project(*camera2_, point->homogeneous());
       if (!pixel) return disc;

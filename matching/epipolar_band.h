@@ -20,6 +20,8 @@ class EpipolarBand {
   static EpipolarBand OfRays(const Eigen::Matrix3d& E, const Camera& camera2, double max_error_px);
   static EpipolarBand OfPixels(const Eigen::Matrix3d& F, double max_error_px);
 
+  bool is_of_rays() const { return camera2_ != nullptr; }
+
   // `x1` is the ray or the pixel of the feature. nullopt if the line passes by farther away than
   // the radius.
   std::optional<Capsule> Around(const Eigen::Vector2f& expected_pixel,

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "matching/extract.h"
 
+#include "matching/ordered_sink.h"
 #include "scene/error.h"
 #include "scene/memory.h"
 #include "scene/parallel.h"
 
 #include <condition_variable>
-#include <map>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -67,29 +67,6 @@ class MemoryGate {
   bool is_given_up_ = false;
 };
 
-// Hands over in the order of indices what comes in any order.
-class OrderedSink {
- public:
-  explicit OrderedSink(const FeatureSink& sink) : sink_(sink) {}
-
-  void Put(size_t photo_idx, Features features) {
-    const std::lock_guard lock(mutex_);
-    waiting_.emplace(photo_idx, std::move(features));
-    while (!waiting_.empty() && waiting_.begin()->first == next_idx_) {
-      Features next = std::move(waiting_.begin()->second);
-      waiting_.erase(waiting_.begin());
-      sink_(next_idx_, std::move(next));
-      ++next_idx_;  // not after an exception: then nothing more is handed over
-    }
-  }
-
- private:
-  const FeatureSink& sink_;
-  std::mutex mutex_;
-  size_t next_idx_ = 0;
-  std::map<size_t, Features> waiting_;
-};
-
 }  // namespace
 
 void ExtractOptions::Check() const {
@@ -106,7 +83,7 @@ void ExtractAll(size_t num_photos,
   options.Check();
   const WithoutOpenCvThreads without_threads;
   MemoryGate gate(options.max_memory > 0 ? options.max_memory : AvailableMemory() / 2);
-  OrderedSink ordered_sink(sink);
+  OrderedSink<Features> ordered_sink(sink);
   const auto extract = [&](size_t photo_idx) {
     MaskedPhoto photo = load(photo_idx);
     const ImageSize size{static_cast<uint64_t>(photo.image.width()),

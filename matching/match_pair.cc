@@ -57,9 +57,7 @@ std::optional<RelativePoseError> ErrorOfPrediction(const MatchingView& view1,
 struct MatchFlow {
   FlowField from_prediction;
   FlowField from_pixel;
-  // Of the measured geometry; a feature of view 1 has a ray or a pixel there.
-  std::optional<EpipolarBand> band;
-  bool is_band_of_rays = false;
+  std::optional<EpipolarBand> band;  // of the measured geometry
 };
 
 // Two passes over one pair.
@@ -72,8 +70,9 @@ class PairMatcher {
   MatchedPair Fine(const MatchedPair& coarse) const;
 
  private:
-  MatchedPair SearchOnce(double num_sigmas) const;
-  bool IsCrowded(const MatchedPair& pair, double num_sigmas) const;
+  WindowPredictor PredictorFor(int num_widenings) const;
+  MatchedPair SearchOnce(const WindowPredictor& predictor) const;
+  bool IsCrowded(const MatchedPair& pair, const WindowPredictor& predictor) const;
   MatchedPair Verified(FeatureMatches matches, MatchMethod method) const;
   MayMatch OnEpipolarLine(const TwoViewGeometry& geometry) const;
   std::optional<EpipolarBand> BandOf(const TwoViewGeometry& geometry) const;
@@ -96,9 +95,14 @@ MatchedPair PairMatcher::Verified(FeatureMatches matches, MatchMethod method) co
   return pair;
 }
 
-MatchedPair PairMatcher::SearchOnce(double num_sigmas) const {
-  const WindowPredictor predictor(
-      view1_.features(), view2_.features(), options_.uncertainty, num_sigmas);
+WindowPredictor PairMatcher::PredictorFor(int num_widenings) const {
+  return WindowPredictor(view1_.features(),
+                         view2_.features(),
+                         options_.uncertainty,
+                         options_.num_sigmas * std::exp2(num_widenings));
+}
+
+MatchedPair PairMatcher::SearchOnce(const WindowPredictor& predictor) const {
   return Verified(SearchWindows(
                       view1_,
                       view2_,
@@ -109,9 +113,7 @@ MatchedPair PairMatcher::SearchOnce(double num_sigmas) const {
                   MatchMethod::kGuided);
 }
 
-bool PairMatcher::IsCrowded(const MatchedPair& pair, double num_sigmas) const {
-  const WindowPredictor predictor(
-      view1_.features(), view2_.features(), options_.uncertainty, num_sigmas);
+bool PairMatcher::IsCrowded(const MatchedPair& pair, const WindowPredictor& predictor) const {
   std::vector<double> shares;
   for (const auto& [idx1, idx2] : pair.geometry.inlier_matches) {
     const auto window = predictor.WindowOf(idx1);
@@ -130,13 +132,13 @@ MatchedPair PairMatcher::Coarse() const {
   for (int i = std::min(options_.min_num_widenings, options_.max_num_widenings);
        i <= options_.max_num_widenings;
        ++i) {
-    const double num_sigmas = options_.num_sigmas * std::exp2(i);
-    MatchedPair pair = SearchOnce(num_sigmas);
+    const WindowPredictor predictor = PredictorFor(i);
+    MatchedPair pair = SearchOnce(predictor);
     if (NumInliers(pair) <= NumInliers(best)) continue;
     best = std::move(pair);
     best.num_widenings = i;
     if (i > 0) best.method = MatchMethod::kWidened;
-    if (NumInliers(best) >= min_num_sure && !IsCrowded(best, num_sigmas)) return best;
+    if (NumInliers(best) >= min_num_sure && !IsCrowded(best, predictor)) return best;
   }
   MatchedPair unguided = Verified(
       SearchAll(view1_,
@@ -153,7 +155,7 @@ MayMatch PairMatcher::OnEpipolarLine(const TwoViewGeometry& geometry) const {
   const ViewFeatures& features1 = view1_.features();
   const ViewFeatures& features2 = view2_.features();
   const double max_error_px = options_.two_view.max_error_px;
-  if (geometry.config == 2) {
+  if (geometry.config == kTwoViewCalibrated) {
     const double max_error =
         2.0 * max_error_px /
         (features1.view.camera.MeanFocalLength() + features2.view.camera.MeanFocalLength());
@@ -163,7 +165,7 @@ MayMatch PairMatcher::OnEpipolarLine(const TwoViewGeometry& geometry) const {
                              features2.rays[idx2].cast<double>()) <= max_error;
     };
   }
-  if (geometry.config == 3) {
+  if (geometry.config == kTwoViewUncalibrated) {
     return [&features1, &features2, max_error_px, F = *geometry.F](uint32_t idx1, uint32_t idx2) {
       return SampsonDistance(F,
                              features1.pixels[idx1].cast<double>(),
@@ -175,10 +177,11 @@ MayMatch PairMatcher::OnEpipolarLine(const TwoViewGeometry& geometry) const {
 
 std::optional<EpipolarBand> PairMatcher::BandOf(const TwoViewGeometry& geometry) const {
   const double max_error_px = options_.two_view.max_error_px;
-  if (geometry.config == 2) {
+  if (geometry.config == kTwoViewCalibrated) {
     return EpipolarBand::OfRays(*geometry.E, view2_.features().view.camera, max_error_px);
   }
-  if (geometry.config == 3) return EpipolarBand::OfPixels(*geometry.F, max_error_px);
+  if (geometry.config == kTwoViewUncalibrated)
+    return EpipolarBand::OfPixels(*geometry.F, max_error_px);
   return std::nullopt;
 }
 
@@ -202,7 +205,7 @@ std::optional<SearchWindow> PairMatcher::FineWindow(const WindowPredictor& predi
   SearchWindow window;
   window.capsule = {centre, centre, ClampedRadius(field.Radius())};
   if (flow.band && window.capsule.radius > kMinBandLength * options_.two_view.max_error_px) {
-    const Eigen::Vector2f& x1 = flow.is_band_of_rays ? view1_.features().rays[idx1] : pixel1;
+    const Eigen::Vector2f& x1 = flow.band->is_of_rays() ? view1_.features().rays[idx1] : pixel1;
     const auto band = flow.band->Around(centre, window.capsule.radius, x1.cast<double>());
     if (!band) return std::nullopt;
     window.capsule = *band;
@@ -213,10 +216,7 @@ std::optional<SearchWindow> PairMatcher::FineWindow(const WindowPredictor& predi
 
 MatchedPair PairMatcher::Fine(const MatchedPair& coarse) const {
   // As wide as the last coarse window, so that nothing it held counts as out of sight.
-  const WindowPredictor predictor(view1_.features(),
-                                  view2_.features(),
-                                  options_.uncertainty,
-                                  options_.num_sigmas * std::exp2(options_.max_num_widenings));
+  const WindowPredictor predictor = PredictorFor(options_.max_num_widenings);
   std::vector<FlowField::Anchor> from_prediction, from_pixel;
   for (const auto& [idx1, idx2] : coarse.geometry.inlier_matches) {
     const Eigen::Vector2f& pixel1 = view1_.features().pixels[idx1];
@@ -229,8 +229,7 @@ MatchedPair PairMatcher::Fine(const MatchedPair& coarse) const {
   }
   const MatchFlow flow = {FlowField(std::move(from_prediction)),
                           FlowField(std::move(from_pixel)),
-                          BandOf(coarse.geometry),
-                          coarse.geometry.config == 2};
+                          BandOf(coarse.geometry)};
   MatchedPair fine = Verified(SearchWindows(
                                   view1_,
                                   view2_,

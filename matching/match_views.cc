@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "matching/match_views.h"
 
+#include "matching/ordered_sink.h"
 #include "matching/view_cache.h"
 #include "scene/error.h"
 #include "scene/parallel.h"
 
 #include <algorithm>
 #include <iterator>
-#include <mutex>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -44,11 +44,10 @@ class Run {
       const MatchViewsOptions& options,
       const ProgressCallback& progress)
       : pairs_(pairs),
-        take_(take),
         options_(options),
         progress_(progress),
         cache_(load, options.max_memory),
-        results_(pairs.size()),
+        ordered_sink_(take),
         num_widenings_(pairs.size()),
         first_widenings_(num_views) {}
 
@@ -60,10 +59,8 @@ class Run {
         [&](int64_t i) {
           const size_t pair_idx = pair_idxs[static_cast<size_t>(i)];
           MatchedPair matched = Match(pairs_[pair_idx]);
-          const std::lock_guard lock(mutex_);
           num_widenings_[pair_idx] = matched.num_widenings;
-          results_[pair_idx] = std::move(matched);
-          HandOver();
+          ordered_sink_.Put(pair_idx, std::move(matched));
         },
         [&](int64_t done, int64_t) {
           num_done_ = num_before + done;
@@ -93,21 +90,11 @@ class Run {
     return MatchPair(*view1, *view2, options);
   }
 
-  // What is ready, in the order of pairs.
-  void HandOver() {
-    for (; num_taken_ < results_.size() && results_[num_taken_]; ++num_taken_) {
-      take_(num_taken_, std::exchange(*results_[num_taken_], {}));
-    }
-  }
-
   const std::vector<ViewPair>& pairs_;
-  const TakeMatchedPair& take_;
   const MatchViewsOptions& options_;
   const ProgressCallback& progress_;
   ViewCache cache_;
-  std::mutex mutex_;  // of results_ and num_taken_
-  std::vector<std::optional<MatchedPair>> results_;
-  size_t num_taken_ = 0;
+  OrderedSink<MatchedPair> ordered_sink_;
   int64_t num_done_ = 0;
   std::vector<int> num_widenings_;                   // per pair
   std::vector<std::optional<int>> first_widenings_;  // per view
