@@ -10,7 +10,6 @@
 #include "scene/parallel.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 
 namespace vgtw {
@@ -61,13 +60,6 @@ void FindMasks(const fs::path& mask_folder, bool allow_missing, std::vector<Mask
   }
 }
 
-// COLMAP's scale of a keypoint: what its columns after x and y say.
-float ScaleOf(const float* row, uint32_t num_columns) {
-  if (num_columns == 2) return 0.0f;
-  if (num_columns == 4) return row[2];
-  return 0.5f * (std::hypot(row[2], row[4]) + std::hypot(row[3], row[5]));
-}
-
 std::vector<Spot> ReadSpots(SqliteConnection& connection, ImageId image_id, bool needs_scale) {
   SqliteQuery query(
       connection, "SELECT rows, cols, data FROM keypoints WHERE image_id = ?", image_id);
@@ -84,7 +76,7 @@ std::vector<Spot> ReadSpots(SqliteConnection& connection, ImageId image_id, bool
   const size_t row_bytes = blob.cols * sizeof(float);
   for (size_t i = 0; i < spots.size(); ++i) {
     std::memcpy(row.data(), blob.bytes.data() + i * row_bytes, row_bytes);
-    spots[i] = {row[0], row[1], needs_scale ? ScaleOf(row.data(), blob.cols) : 0.0f};
+    spots[i] = {row[0], row[1], needs_scale ? KeypointScale(row.data(), blob.cols) : 0.0f};
   }
   return spots;
 }

@@ -4,12 +4,12 @@
 #include "bridge/colmap_rows.h"
 #include "bridge/mask_undo.h"
 #include "bridge/sqlite.h"
+#include "scene/disjoint_sets.h"
 #include "scene/error.h"
 
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <string>
 
@@ -103,30 +103,21 @@ class Tracks {
         Fail(path, "has more than 4294967295 keypoints", "less", "use another --rule");
       }
     }
-    parents_.resize(num_keypoints);
-    std::iota(parents_.begin(), parents_.end(), 0);
+    sets_ = DisjointSets<uint32_t>(num_keypoints);
   }
 
   void Link(size_t image_idx1, uint32_t idx1, size_t image_idx2, uint32_t idx2) {
-    const uint32_t root1 = Root(image_idx1, idx1);
-    const uint32_t root2 = Root(image_idx2, idx2);
-    parents_[std::max(root1, root2)] = std::min(root1, root2);
+    sets_.Join(first_[image_idx1] + idx1, first_[image_idx2] + idx2);
   }
 
   // One keypoint that stands for all of a track.
-  uint32_t Root(size_t image_idx, uint32_t idx) {
-    uint32_t keypoint = first_[image_idx] + idx;
-    while (parents_[keypoint] != keypoint) {
-      keypoint = parents_[keypoint] = parents_[parents_[keypoint]];
-    }
-    return keypoint;
-  }
+  uint32_t Root(size_t image_idx, uint32_t idx) { return sets_.Find(first_[image_idx] + idx); }
 
-  size_t num_keypoints() const { return parents_.size(); }
+  size_t num_keypoints() const { return sets_.num_elements(); }
 
  private:
   std::vector<uint32_t> first_;  // per image, its first keypoint among all
-  std::vector<uint32_t> parents_;
+  DisjointSets<uint32_t> sets_{0};
 };
 
 template <typename Visit>

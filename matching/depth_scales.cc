@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "matching/depth_scales.h"
 
+#include "scene/disjoint_sets.h"
 #include "scene/error.h"
 #include "scene/statistics.h"
 
@@ -127,17 +128,10 @@ class DepthGraph {
   }
 
   void FindComponents() {
+    DisjointSets<> sets(views_.size());
+    for (const ViewPair& pair : pairs_) sets.Join(pair.from, pair.to);
     component_.resize(views_.size());
-    std::iota(component_.begin(), component_.end(), 0);
-    const auto root_of = [&](size_t i) {
-      while (component_[i] != i) i = component_[i] = component_[component_[i]];
-      return i;
-    };
-    for (const ViewPair& pair : pairs_) {
-      const auto [first, second] = std::minmax({root_of(pair.from), root_of(pair.to)});
-      component_[second] = first;
-    }
-    for (size_t i = 0; i < component_.size(); ++i) component_[i] = root_of(i);
+    for (size_t i = 0; i < component_.size(); ++i) component_[i] = sets.Find(i);
   }
 
   // Moves the median of each component to 0; the median views are anchors of the next iteration.

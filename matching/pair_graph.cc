@@ -1,31 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "matching/pair_graph.h"
 
-#include <algorithm>
-#include <numeric>
-
 namespace vgtw {
-
-DisjointSets::DisjointSets(size_t num_elements) : parents_(num_elements), num_sets_(num_elements) {
-  std::iota(parents_.begin(), parents_.end(), size_t{0});
-}
-
-size_t DisjointSets::Find(size_t element) {
-  while (parents_[element] != element) {
-    parents_[element] = parents_[parents_[element]];
-    element = parents_[element];
-  }
-  return element;
-}
-
-bool DisjointSets::Join(size_t a, size_t b) {
-  const size_t root_a = Find(a);
-  const size_t root_b = Find(b);
-  if (root_a == root_b) return false;
-  parents_[std::max(root_a, root_b)] = std::min(root_a, root_b);
-  --num_sets_;
-  return true;
-}
 
 HopGraph::HopGraph(size_t num_nodes) : neighbours_(num_nodes), marks_(num_nodes, 0) {}
 

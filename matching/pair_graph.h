@@ -6,21 +6,6 @@
 
 namespace vgtw {
 
-// Disjoint sets of 0 .. n-1.
-class DisjointSets {
- public:
-  explicit DisjointSets(size_t num_elements);
-
-  size_t Find(size_t element);
-  // Whether they were apart.
-  bool Join(size_t a, size_t b);
-  size_t num_sets() const { return num_sets_; }
-
- private:
-  std::vector<size_t> parents_;
-  size_t num_sets_ = 0;
-};
-
 // An undirected graph that grows edge by edge.
 class HopGraph {
  public:

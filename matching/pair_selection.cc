@@ -3,6 +3,7 @@
 
 #include "matching/pair_candidates.h"
 #include "matching/pair_graph.h"
+#include "scene/disjoint_sets.h"
 #include "scene/error.h"
 #include "scene/parallel.h"
 
@@ -48,7 +49,7 @@ class PairMeasurer {
     const auto max_num = static_cast<size_t>(options_.max_candidates);
     std::vector<ViewPair> pairs =
         Measure(PairsOf([&](size_t view_idx) { return Thin(candidates_.Of(view_idx), max_num); }));
-    DisjointSets parts(covisibility_.num_views());
+    DisjointSets<> parts(covisibility_.num_views());
     for (const ViewPair& pair : pairs) parts.Join(pair.view_idx1, pair.view_idx2);
     if (parts.num_sets() <= 1) return pairs;
     std::vector<size_t> part_by_view;
@@ -188,7 +189,7 @@ class PairChooser {
   }
 
   void ChooseForest() {
-    DisjointSets parts(pairs_by_view_.size());
+    DisjointSets<> parts(pairs_by_view_.size());
     for (const size_t i : by_covisibility_) {
       if (parts.Join(pairs_[i].view_idx1, pairs_[i].view_idx2)) is_chosen_[i] = true;
     }

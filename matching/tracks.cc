@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "matching/tracks.h"
 
+#include "scene/disjoint_sets.h"
 #include "scene/error.h"
 
 #include <algorithm>
@@ -258,21 +259,14 @@ void CountConfirmations(size_t num_nodes, std::vector<Edge>& edges) {
 class Components {
  public:
   explicit Components(const Nodes& nodes)
-      : root_(nodes.size()),
+      : sets_(nodes.size()),
         next_(nodes.size()),
         image_idxs_(nodes.ImageIdxs()),
         visit_of_image_(nodes.NumImages(), 0) {
-    std::iota(root_.begin(), root_.end(), 0);
     std::iota(next_.begin(), next_.end(), 0);
   }
 
-  Node RootOf(Node node) {
-    while (root_[node] != node) {
-      root_[node] = root_[root_[node]];
-      node = root_[node];
-    }
-    return node;
-  }
+  Node RootOf(Node node) { return sets_.Find(node); }
 
   // False if the two sets hold keypoints of one image.
   bool Join(Node a, Node b) {
@@ -284,7 +278,7 @@ class Components {
     ForEach(second,
             [&](Node node) { shares_image |= visit_of_image_[image_idxs_[node]] == visit_; });
     if (shares_image) return false;
-    root_[second] = first;
+    sets_.Join(first, second);
     std::swap(next_[first], next_[second]);  // two rings become one
     return true;
   }
@@ -299,7 +293,7 @@ class Components {
     } while (node != root);
   }
 
-  std::vector<Node> root_;
+  DisjointSets<Node> sets_;
   std::vector<Node> next_;  // each set is a ring
   std::vector<uint32_t> image_idxs_;
   std::vector<uint64_t> visit_of_image_;

@@ -14,11 +14,6 @@
 namespace vgtw {
 namespace {
 
-constexpr int kConfigDegenerate = 1;
-constexpr int kConfigCalibrated = 2;
-constexpr int kConfigUncalibrated = 3;
-constexpr int kConfigPlanar = 4;
-constexpr int kConfigPanoramic = 5;
 constexpr int kMaxNumRefinements = 5;
 
 // Matches in both units, as the estimators want them.
@@ -234,7 +229,7 @@ TwoViewGeometry EstimateTwoViewGeometry(const ViewFeatures& view1,
   const Correspondences all = Collect(view1, view2, matches);
   const auto min_num_inliers = static_cast<size_t>(options.min_num_inliers);
   TwoViewGeometry geometry;
-  geometry.config = kConfigDegenerate;
+  geometry.config = kTwoViewDegenerate;
   if (all.size() < min_num_inliers) return geometry;
   Rigid3d cam2_from_cam1;
   const Estimate essential = EstimateEssential(all, options, cam2_from_cam1);
@@ -249,13 +244,13 @@ TwoViewGeometry EstimateTwoViewGeometry(const ViewFeatures& view1,
       static_cast<double>(essential.num_inliers) >=
           options.min_E_F_inlier_ratio * static_cast<double>(fundamental.num_inliers);
   const Estimate* best = is_calibrated ? &essential : &fundamental;
-  geometry.config = is_calibrated ? kConfigCalibrated : kConfigUncalibrated;
+  geometry.config = is_calibrated ? kTwoViewCalibrated : kTwoViewUncalibrated;
   if (is_calibrated) geometry.cam2_from_cam1 = cam2_from_cam1;
   if (homography.num_inliers >= min_num_inliers &&
       static_cast<double>(homography.num_inliers) >
           options.max_H_inlier_ratio * static_cast<double>(best->num_inliers)) {
     const bool is_panoramic = IsPanoramic(homography, all, options, cam2_from_cam1);
-    geometry.config = is_panoramic ? kConfigPanoramic : kConfigPlanar;
+    geometry.config = is_panoramic ? kTwoViewPanoramic : kTwoViewPlanar;
     if (is_panoramic) geometry.cam2_from_cam1 = cam2_from_cam1;
     if (homography.num_inliers > best->num_inliers) best = &homography;
   }

@@ -5,11 +5,10 @@
 
 namespace vgtw {
 
-float Keypoints::Scale(size_t row) const {
+float KeypointScale(const float* row, uint32_t cols) {
   if (cols == 2) return 0.0f;
-  const float* values = data.data() + row * cols;
-  if (cols == 4) return values[2];
-  return 0.5f * (std::hypot(values[2], values[4]) + std::hypot(values[3], values[5]));
+  if (cols == 4) return row[2];
+  return 0.5f * (std::hypot(row[2], row[4]) + std::hypot(row[3], row[5]));
 }
 
 }  // namespace vgtw

@@ -13,6 +13,9 @@
 
 namespace vgtw {
 
+// COLMAP's scale (pixels) of a row of keypoints, which has `cols` values; 0 with 2 columns.
+float KeypointScale(const float* row, uint32_t cols);
+
 // float32 [rows, cols], cols 2 (x y), 4 (x y scale orientation_rad) or 6 (x y a11 a12 a21 a22);
 // x, y in original pixels, first centre (0.5, 0.5).
 struct Keypoints {
@@ -22,8 +25,7 @@ struct Keypoints {
 
   float x(size_t row) const { return data[row * cols]; }
   float y(size_t row) const { return data[row * cols + 1]; }
-  // COLMAP's scale (pixels); 0 with 2 columns.
-  float Scale(size_t row) const;
+  float Scale(size_t row) const { return KeypointScale(data.data() + row * cols, cols); }
 };
 
 // Bytes [rows, cols]; cols is bytes per row (128 for SIFT). type: COLMAP 4's, -1 = undefined,
@@ -44,9 +46,15 @@ struct Features {
 // (point2D_idx in image 1, point2D_idx in image 2); image 1 is the one that was named first.
 using FeatureMatches = std::vector<std::array<uint32_t, 2>>;
 
+// COLMAP's configurations that are made here. Others: 0 undefined, 6 planar or panoramic,
+// 7 watermark, 8 multiple, 9 calibrated rig (>= 3.12).
+inline constexpr int kTwoViewDegenerate = 1;
+inline constexpr int kTwoViewCalibrated = 2;
+inline constexpr int kTwoViewUncalibrated = 3;
+inline constexpr int kTwoViewPlanar = 4;
+inline constexpr int kTwoViewPanoramic = 5;
+
 // How image 2 relates to image 1:  x2^T F x1 = 0,  x2 ~ H x1  (pixels), E likewise for rays.
-// config: 0 undefined, 1 degenerate, 2 calibrated, 3 uncalibrated, 4 planar, 5 panoramic,
-// 6 planar or panoramic, 7 watermark, 8 multiple, 9 calibrated rig (COLMAP >= 3.12).
 struct TwoViewGeometry {
   int config = 0;
   FeatureMatches inlier_matches = {};

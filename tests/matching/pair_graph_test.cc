@@ -10,17 +10,6 @@
 namespace vgtw {
 namespace {
 
-TEST(DisjointSets, JoinOnlyOnce) {
-  DisjointSets sets(5);
-  EXPECT_TRUE(sets.Join(0, 1));
-  EXPECT_TRUE(sets.Join(3, 2));
-  EXPECT_TRUE(sets.Join(2, 0));
-  EXPECT_FALSE(sets.Join(1, 3));
-  EXPECT_EQ(sets.num_sets(), 2u);
-  EXPECT_EQ(sets.Find(3), sets.Find(1));
-  EXPECT_NE(sets.Find(4), sets.Find(1));
-}
-
 TEST(HopGraph, CountsEdgesOnAChain) {
   HopGraph graph(6);
   for (size_t i = 0; i + 2 < 6; ++i) graph.AddEdge(i, i + 1);  // 5 stands alone

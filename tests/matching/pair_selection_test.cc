@@ -2,6 +2,7 @@
 #include "matching/pair_selection.h"
 
 #include "matching/pair_graph.h"
+#include "scene/disjoint_sets.h"
 #include "scene/perturb.h"
 #include "scene/random.h"
 #include "scene/static_view.h"
@@ -62,7 +63,7 @@ std::vector<ViewPair> MeasureAll(const std::vector<ViewSketch>& sketches) {
 }
 
 size_t NumParts(size_t num_views, const std::vector<ViewPair>& pairs) {
-  DisjointSets parts(num_views);
+  DisjointSets<> parts(num_views);
   for (const ViewPair& pair : pairs) parts.Join(pair.view_idx1, pair.view_idx2);
   return parts.num_sets();
 }
