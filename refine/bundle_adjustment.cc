@@ -6,6 +6,7 @@
 #include "scene/reprojection.h"
 
 #include <algorithm>
+#include <chrono>
 #include <string>
 
 namespace vgtw {
@@ -20,6 +21,7 @@ void BundleAdjustmentOptions::Check() const {
   VGTW_CHECK(function_tolerance >= 0.0 && function_tolerance < 1.0,
              "BundleAdjustmentOptions::function_tolerance = " + std::to_string(function_tolerance) +
                  ", must be in [0, 1)");
+  priors.Check();
 }
 
 BundleAdjustmentSummary AdjustBundle(const BundleAdjustmentOptions& options,
@@ -28,6 +30,7 @@ BundleAdjustmentSummary AdjustBundle(const BundleAdjustmentOptions& options,
   const std::string fault = FindFault(reconstruction);
   VGTW_CHECK(fault.empty(), fault);
 
+  const auto start = std::chrono::steady_clock::now();
   BundleAdjustmentSummary summary;
   const BundleParticipants participants = FindBundleParticipants(reconstruction);
   if (participants.point3D_ids.empty()) {
@@ -41,7 +44,11 @@ BundleAdjustmentSummary AdjustBundle(const BundleAdjustmentOptions& options,
   summary.initial_cost = solved.initial_cost;
   summary.final_cost = solved.final_cost;
   summary.num_iterations = std::max(0, static_cast<int>(solved.iterations.size()) - 1);
+  summary.evaluation_sec =
+      solved.residual_evaluation_time_in_seconds + solved.jacobian_evaluation_time_in_seconds;
+  summary.linear_solver_sec = solved.linear_solver_time_in_seconds;
   summary.gauge = problem.gauge().description;
+  summary.priors = problem.SummarizePriors();
   if (!solved.IsSolutionUsable() || !(solved.final_cost <= solved.initial_cost)) return summary;
 
   if (!problem.IsPossible()) {
@@ -51,6 +58,8 @@ BundleAdjustmentSummary AdjustBundle(const BundleAdjustmentOptions& options,
   problem.WriteTo(reconstruction);
   UpdateFrames(reconstruction);
   UpdatePointErrors(reconstruction);
+  summary.total_sec =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   summary.success = true;
   return summary;
 }

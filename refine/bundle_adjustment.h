@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "refine/bundle_priors.h"
 #include "scene/reconstruction.h"
 
 #include <cstddef>
@@ -21,6 +22,7 @@ struct BundleAdjustmentOptions {
   bool refine_focal_length = true;
   bool refine_principal_point = false;
   bool refine_extra_params = false;
+  BundlePriors priors;
   int max_num_iterations = 50;
   // Done when an iteration lowers the cost by less than this share; in [0, 1).
   double function_tolerance = 1e-9;
@@ -35,18 +37,24 @@ struct BundleAdjustmentOptions {
 struct BundleAdjustmentSummary {
   bool success = false;       // the solution is usable and was written to the reconstruction
   std::string message;        // the solver's word, or why nothing was done
-  size_t num_residuals = 0;   // two per observation
+  size_t num_residuals = 0;   // two per observation, and those of priors
   double initial_cost = 0.0;  // half the sum of the robust losses, pixels^2
   double final_cost = 0.0;
   int num_iterations = 0;
-  std::string gauge;  // which images fix the gauge, in words
+  double total_sec = 0.0;          // wall time, with setting up and writing back
+  double evaluation_sec = 0.0;     // of residuals and derivatives
+  double linear_solver_sec = 0.0;  // of steps
+  std::string gauge;               // which images fix the gauge, in words
+  BundlePriorsSummary priors;
 };
 
 // Minimises  sum rho(|project(camera, cam_from_world * X) - point2D|^2)  over the points, poses and
 // intrinsics. Observations that are behind their camera at the start, and points that fewer than
 // two images then observe, take no part; images with fewer than 3 observations keep their pose.
 // Gauge, per group of images linked by common points: the pose of one image and one coordinate of
-// the translation of the image farthest from it (7 degrees of freedom), see refine/gauge.h.
+// the translation of the image farthest from it (7 degrees of freedom), see refine/gauge.h. Priors
+// in a world of their own link groups, since their similarity is one for all; priors in the model's
+// world (PriorWorld::kSame) take the place of the gauge in the groups that they determine.
 // Afterwards frames and point errors are up to date. If there is nothing to adjust, the solver
 // fails, or the cost grows, the reconstruction is left as it was.
 // Throws std::invalid_argument if the reconstruction breaks its law.
