@@ -26,7 +26,7 @@ struct DatabaseImage {
   CameraId camera_id = 0;
 };
 
-struct PosePrior {
+struct DatabasePosePrior {
   ImageId image_id = 0;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // camera centre
   std::optional<Eigen::Matrix3d> position_covariance = {};
@@ -80,7 +80,7 @@ class ColmapDatabase {
   std::vector<std::pair<ImageId, ImageId>> ReadMatchPairs() const;
   std::vector<std::pair<ImageId, ImageId>> ReadTwoViewPairs() const;
   // Sorted by image id; rows of COLMAP >= 4 without a position (gravity only) are left out.
-  std::vector<PosePrior> ReadPosePriors() const;
+  std::vector<DatabasePosePrior> ReadPosePriors() const;
   std::vector<Rig> ReadRigs() const;
   std::vector<Frame> ReadFrames() const;  // without poses
 
@@ -106,7 +106,7 @@ class ColmapDatabase {
   void WriteTwoViewGeometry(ImageId image_id1, ImageId image_id2, const TwoViewGeometry& geometry);
   void ClearMatches();  // all rows of matches and two-view geometries
   // The covariance is left out where 3.10 has no column for it. Throws Error without the table.
-  void WritePosePrior(const PosePrior& prior);
+  void WritePosePrior(const DatabasePosePrior& prior);
   // Replaces rigs and frames by the trivial ones: one rig per camera (rig_id = camera_id), one
   // frame per image (frame_id = image_id). No effect where the schema has no rigs.
   void WriteTrivialRigsAndFrames();

@@ -54,12 +54,12 @@ void RequireRigs(const DatabaseSchema& schema, const std::filesystem::path& path
 
 }  // namespace
 
-std::vector<PosePrior> ColmapDatabase::ReadPosePriors() const {
-  std::vector<PosePrior> priors;
+std::vector<DatabasePosePrior> ColmapDatabase::ReadPosePriors() const {
+  std::vector<DatabasePosePrior> priors;
   if (!impl_->schema.has_pose_priors) return priors;
   SqliteQuery query(impl_->connection, SelectPosePriors(impl_->schema));
   while (query.Next()) {
-    PosePrior prior;
+    DatabasePosePrior prior;
     prior.image_id = CheckedId(query, 0, "image");
     const std::string owner = "pose prior of image " + std::to_string(prior.image_id);
     const auto position = ReadDoubles<3>(query, 1, owner);
@@ -75,7 +75,7 @@ std::vector<PosePrior> ColmapDatabase::ReadPosePriors() const {
   return priors;
 }
 
-void ColmapDatabase::WritePosePrior(const PosePrior& prior) {
+void ColmapDatabase::WritePosePrior(const DatabasePosePrior& prior) {
   SqliteConnection& connection = impl_->Writable();
   const DatabaseSchema& schema = impl_->schema;
   if (!schema.has_pose_priors) {

@@ -171,7 +171,7 @@ TEST(ColmapDatabase, WhatIsNotSetIsStoredAsTheVersionDoes) {
 
 TEST(ColmapDatabase, PosePriorsOfEveryLayout) {
   const TemporaryFolder folder;
-  PosePrior prior{.image_id = 2, .position = {1.0, -2.0, 3.5}, .coordinate_system = 0};
+  DatabasePosePrior prior{.image_id = 2, .position = {1.0, -2.0, 3.5}, .coordinate_system = 0};
   prior.position_covariance = Eigen::Matrix3d(Eigen::Vector3d(1, 4, 9).asDiagonal());
   for (const VersionTables& tables : kVersions) {
     const auto path = folder / (std::string(tables.version) + ".db");
