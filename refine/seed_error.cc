@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "refine/seed_error.h"
+
+#include "refine/held_out.h"
+#include "scene/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace vgtw {
+namespace {
+
+constexpr size_t kMaxTracks = 4000;
+// Poses that are farther off are of no use to begin with.
+constexpr double kWorstErrorDeg = 15.0;
+// Errors beyond so many medians are those of wrong matches: of normal errors in two dimensions 1 in
+// 10^10 is.
+constexpr double kMaxMedians = 6.0;
+constexpr int kNumPasses = 3;
+
+double PixelsOfAngle(const Reconstruction& model, double angle_deg) {
+  double focal_length = 0.0;
+  for (const auto& [id, image] : model.images) {
+    focal_length = std::max(focal_length, model.cameras.at(image.camera_id).MeanFocalLength());
+  }
+  return focal_length * std::tan(angle_deg * std::numbers::pi / 180.0);
+}
+
+}  // namespace
+
+SeedError MeasureSeedError(const Reconstruction& model,
+                           const std::vector<Track>& tracks,
+                           int num_threads) {
+  std::vector<Track> longest = tracks;
+  if (longest.size() > kMaxTracks) {
+    std::stable_sort(longest.begin(), longest.end(), [](const Track& a, const Track& b) {
+      return a.size() > b.size();
+    });
+    longest.resize(kMaxTracks);
+  }
+  SeedError error;
+  error.max_px = PixelsOfAngle(model, kWorstErrorDeg);
+  if (longest.empty()) return error;
+  const double worst_px = error.max_px;
+  for (int i = 0; i < kNumPasses; ++i) {
+    const double scale_px = error.max_px / kMaxMedians;
+    const HeldOutJudge judge(longest, scale_px, 2.0 * worst_px, num_threads);
+    error.median_px = Median(judge.Measure(model));
+    error.max_px = std::min(std::max(kMaxMedians * error.median_px, 1.0), worst_px);
+  }
+  return error;
+}
+
+}  // namespace vgtw
