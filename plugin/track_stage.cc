@@ -3,6 +3,7 @@
 
 #include "matching/track_lifting.h"
 #include "matching/tracks.h"
+#include "plugin/database_tracks.h"
 #include "plugin/progress.h"
 #include "plugin/static_views.h"
 #include "scene/error.h"
@@ -13,26 +14,6 @@
 
 namespace vgtw {
 namespace {
-
-std::vector<PairMatches> VerifiedMatches(const ColmapDatabase& database,
-                                         const Reconstruction& reconstruction) {
-  std::vector<PairMatches> pairs;
-  for (const auto& [image_id1, image_id2] : database.ReadTwoViewPairs()) {
-    if (!reconstruction.images.contains(image_id1) || !reconstruction.images.contains(image_id2)) {
-      continue;
-    }
-    FeatureMatches matches =
-        std::move(database.ReadTwoViewGeometry(image_id1, image_id2)->inlier_matches);
-    if (!matches.empty()) pairs.push_back({image_id1, image_id2, std::move(matches)});
-  }
-  if (pairs.empty()) {
-    Fail(database.path(),
-         "no verified matches between images with a prediction",
-         "some",
-         "'vgtw match' or a matcher of colmap makes them");
-  }
-  return pairs;
-}
 
 // Keypoints with their depths; descriptors stay in the database.
 std::map<ImageId, ViewFeatures> LoadViews(const PredictionReader& predictions,
@@ -69,7 +50,7 @@ TrackStageSummary AddLiftedTracks(const PredictionReader& predictions,
                                   const ColmapDatabase& database,
                                   const TrackStageOptions& options,
                                   Reconstruction& reconstruction) {
-  const std::vector<PairMatches> pairs = VerifiedMatches(database, reconstruction);
+  const std::vector<PairMatches> pairs = ReadVerifiedMatches(database, reconstruction);
   const std::map<ImageId, ViewFeatures> views =
       LoadViews(predictions, database, options, reconstruction);
   std::map<ImageId, TrackImage> images;
