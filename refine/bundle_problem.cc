@@ -48,30 +48,51 @@ std::vector<size_t> FindComponents(const BundleParticipants& participants) {
   return labels;
 }
 
-// Images without observations are held, and no part of the gauge.
+// The images that have observations.
+std::map<ImageId, LinkedImage> LinkImages(const Reconstruction& reconstruction,
+                                          const BundleParticipants& participants) {
+  const std::vector<size_t> components = FindComponents(participants);
+  std::map<ImageId, LinkedImage> images;
+  for (size_t i = 0; i < components.size(); ++i) {
+    if (participants.num_observations[i] == 0) continue;
+    const ImageId image_id = participants.image_ids[i];
+    images[image_id] = {reconstruction.images.at(image_id).cam_from_world, components[i]};
+  }
+  return images;
+}
+
+// Images without observations are held, and no part of the gauge; no part of it either, but free,
+// are those that priors anchor.
 Gauge ChooseGauge(const BundleAdjustmentOptions& options,
                   const Reconstruction& reconstruction,
-                  const BundleParticipants& participants) {
-  const std::vector<size_t> components = FindComponents(participants);
+                  const BundleParticipants& participants,
+                  const std::map<ImageId, LinkedImage>& linked_images,
+                  const std::set<ImageId>& anchored) {
+  Gauge gauge;
+  gauge.is_held.assign(participants.image_ids.size(), true);
+  gauge.held_coordinates.assign(participants.image_ids.size(), -1);
   std::vector<GaugeImage> images;
   std::vector<size_t> image_idxs;
   for (size_t i = 0; i < participants.image_ids.size(); ++i) {
-    if (participants.num_observations[i] == 0) continue;
+    const size_t num_observations = participants.num_observations[i];
+    if (num_observations == 0) continue;
     const Image& image = reconstruction.images.at(participants.image_ids[i]);
     const bool is_held = !options.refine_poses || options.fixed_images.contains(image.image_id) ||
-                         participants.num_observations[i] < kMinPoseObservations;
-    images.push_back({image.name,
-                      image.cam_from_world,
-                      participants.num_observations[i],
-                      components[i],
-                      is_held});
+                         num_observations < kMinPoseObservations;
+    if (anchored.contains(image.image_id)) {
+      gauge.is_held[i] = is_held;
+      continue;
+    }
+    const LinkedImage& linked = linked_images.at(image.image_id);
+    images.push_back(
+        {image.name, image.cam_from_world, num_observations, linked.component, is_held});
     image_idxs.push_back(i);
   }
   const Gauge dense = ChooseGauge(images);
-  Gauge gauge;
   gauge.description = dense.description;
-  gauge.is_held.assign(participants.image_ids.size(), true);
-  gauge.held_coordinates.assign(participants.image_ids.size(), -1);
+  if (!anchored.empty()) {
+    gauge.description += (images.empty() ? "" : "; ") + std::string("the world of the priors");
+  }
   for (size_t i = 0; i < image_idxs.size(); ++i) {
     gauge.is_held[image_idxs[i]] = dense.is_held[i];
     gauge.held_coordinates[image_idxs[i]] = dense.held_coordinates[i];
@@ -183,12 +204,15 @@ BundleProblem::BundleProblem(const BundleAdjustmentOptions& options,
     : options_(options),
       reconstruction_(reconstruction),
       participants_(participants),
-      gauge_(ChooseGauge(options, reconstruction, participants)),
       loss_(MakeLoss(options)),
       problem_(WithoutLossOwnership()) {
+  std::map<ImageId, LinkedImage> images = LinkImages(reconstruction, participants);
+  prior_ties_ = TieComponents(options.priors, images);
+  gauge_ = ChooseGauge(options, reconstruction, participants, images, prior_ties_.anchored);
   ChooseWorkingFrame();
   CopyParameters();
   AddResiduals();
+  AddPriors();
   HoldPoses();
   HoldIntrinsics();
 }
@@ -236,6 +260,22 @@ void BundleProblem::AddResiduals() {
           params_.at(camera_id).data());
     }
   }
+}
+
+void BundleProblem::AddPriors() {
+  PriorTargets targets;
+  targets.working_from_world = working_from_world_;
+  for (size_t i = 0; i < poses_.size(); ++i) {
+    if (participants_.num_observations[i] == 0) continue;
+    targets.poses[participants_.image_ids[i]] = poses_[i].data();
+  }
+  for (auto& [camera_id, params] : params_) {
+    if (problem_.HasParameterBlock(params.data())) targets.params[camera_id] = params.data();
+  }
+  for (size_t i = 0; i < points_.size() && !options_.priors.depths.by_image.empty(); ++i) {
+    targets.points[participants_.point3D_ids[i]] = points_[i].data();
+  }
+  priors_.emplace(options_.priors, prior_ties_, reconstruction_, targets, problem_);
 }
 
 void BundleProblem::HoldPoses() {

@@ -3,6 +3,7 @@
 
 #include "refine/bundle_adjustment.h"
 #include "refine/gauge.h"
+#include "refine/prior_blocks.h"
 #include "refine/reprojection_cost.h"
 #include "scene/sim3d.h"
 
@@ -10,6 +11,7 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <ceres/ceres.h>
@@ -44,6 +46,7 @@ class BundleProblem {
 
   const Gauge& gauge() const { return gauge_; }
   int num_residuals() const { return problem_.NumResiduals(); }
+  BundlePriorsSummary SummarizePriors() const { return priors_->Summarize(); }
 
   ceres::Solver::Summary Solve();
 
@@ -57,6 +60,7 @@ class BundleProblem {
   void ChooseWorkingFrame();
   void CopyParameters();
   void AddResiduals();
+  void AddPriors();
   void HoldPoses();
   void HoldIntrinsics();
   std::shared_ptr<ceres::ParameterBlockOrdering> PointsFirst();
@@ -64,6 +68,7 @@ class BundleProblem {
   const BundleAdjustmentOptions& options_;
   const Reconstruction& reconstruction_;
   const BundleParticipants& participants_;
+  PriorTies prior_ties_;
   Gauge gauge_;
   std::unique_ptr<ceres::LossFunction> loss_;  // one for all residuals
   ceres::Problem problem_;
@@ -71,6 +76,7 @@ class BundleProblem {
   std::vector<std::array<double, kNumPoseParams>> poses_;
   std::vector<Eigen::Vector3d> points_;
   std::map<CameraId, std::vector<double>> params_;
+  std::optional<PriorBlocks> priors_;
 };
 
 }  // namespace vgtw
