@@ -174,23 +174,20 @@ TEST(TriangulateTracks, ObservesOneKeypointPerImageTheBest) {
   }
 }
 
-TEST(TriangulateTracks, HonoursItsLimits) {
+TEST(TriangulateTracks, ObservesWhatIsWithinTheLimit) {
   Reconstruction noisy = MakeSyntheticModel({});
   ProjectAgain(noisy, 2.0, 3);
-  const std::vector<Track> tracks = TracksOf(noisy);
   TriangulationOptions options;
   options.max_error_px = 3.0;
-  options.min_angle_deg = 80.0;  // cameras stand on an arc of 90 degrees
+  options.min_angle_deg = 0.0;
   Reconstruction model = WithoutPoints(noisy);
-  const TriangulationSummary summary = TriangulateTracks(options, tracks, model);
+  const TriangulationSummary summary = TriangulateTracks(options, TracksOf(noisy), model);
   EXPECT_EQ(FindFault(model), "");
-  // Some, not all, pass each limit, else this would test nothing.
-  EXPECT_GT(summary.num_points3D, 20u);
-  EXPECT_LT(summary.num_points3D, 120u);
-  EXPECT_LT(summary.num_observations, 6 * summary.num_points3D);
+  // Noise of 2 px per coordinate is beyond 3 px in a third of all cases.
+  EXPECT_LT(summary.num_observations, 650u);
+  EXPECT_GT(summary.num_observations, 400u);
   // Reprojection by rays is of first order: 3 px of 500 make 1 % of difference at most.
   for (const auto& [id, point] : model.points3D) {
-    EXPECT_GE(LargestAngleDeg(model, point), options.min_angle_deg - 1e-9);
     for (const TrackElement& element : point.track) {
       EXPECT_LT(ErrorOfPx(model, element), 1.01 * options.max_error_px);
     }
@@ -208,10 +205,10 @@ TEST(TriangulateTracks, HonoursItsLimits) {
 
 TEST(TriangulateTracks, AngleDecidesWhetherAPointIsOne) {
   SyntheticModelOptions narrow;
-  narrow.num_images = 2;
-  narrow.arc_deg = 1.0;
+  narrow.num_images = 3;
+  narrow.arc_deg = 2.0;
   const Reconstruction truth = MakeSyntheticModel(narrow);
-  for (const double min_angle_deg : {0.0, 1.5, 40.0}) {
+  for (const double min_angle_deg : {0.0, 2.0, 40.0}) {
     Reconstruction model = WithoutPoints(truth);
     TriangulateTracks({4.0, min_angle_deg, 1}, TracksOf(truth), model);
     const auto num_wide =
@@ -219,6 +216,9 @@ TEST(TriangulateTracks, AngleDecidesWhetherAPointIsOne) {
           return LargestAngleDeg(truth, entry.second) >= min_angle_deg;
         });
     EXPECT_EQ(static_cast<ptrdiff_t>(model.points3D.size()), num_wide) << min_angle_deg;
+    for (const auto& [id, point] : model.points3D) {
+      EXPECT_GE(LargestAngleDeg(model, point), min_angle_deg);
+    }
   }
 }
 
