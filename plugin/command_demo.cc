@@ -13,9 +13,10 @@ namespace vgtw {
 namespace {
 
 std::string NumRefined(const PipelineReport& report) {
-  const auto num = std::count_if(report.views.begin(),
-                                 report.views.end(),
-                                 [](const ViewReport& view) { return view.is_refined; });
+  const auto num =
+      std::count_if(report.views.begin(), report.views.end(), [](const ViewReport& view) {
+        return view.outcome == Name(ViewOutcome::kRefined);
+      });
   return std::to_string(num) + "/" + std::to_string(report.views.size());
 }
 

@@ -74,6 +74,11 @@ const std::vector<Command>& Commands() {
        DeclareSeed,
        "  vgtw seed --predictions_path predictions/ --image_path photos/ --output_path sparse/\n"
        "  vgtw seed --predictions_path predictions/ --database_path a.db --output_path seed/"},
+      {"refine",
+       "COLMAP model (and database) -> refined model, never worse than it was",
+       DeclareRefine,
+       "  vgtw refine --input_path seed/ --database_path a.db --output_path refined/\n"
+       "  vgtw refine --input_path sparse/0 --output_path refined/"},
       {"run",
        "Photos and predictions -> masks, database, refined COLMAP model, report",
        DeclareRun,

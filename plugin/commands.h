@@ -26,6 +26,7 @@ std::function<void()> DeclareMaskScore(Flags& flags);
 std::function<void()> DeclareMaskUndistort(Flags& flags);
 std::function<void()> DeclareMaskVote(Flags& flags);
 std::function<void()> DeclareMatch(Flags& flags);
+std::function<void()> DeclareRefine(Flags& flags);
 std::function<void()> DeclareRun(Flags& flags);
 std::function<void()> DeclareSeed(Flags& flags);
 

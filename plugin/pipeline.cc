@@ -8,15 +8,17 @@
 #include "bridge/point_cloud.h"
 #include "bridge/predictions.h"
 #include "plugin/colmap.h"
+#include "plugin/database_tracks.h"
 #include "plugin/feature_stage.h"
 #include "plugin/hashing.h"
 #include "plugin/progress.h"
-#include "plugin/refine_rounds.h"
+#include "plugin/refine_report.h"
 #include "plugin/report.h"
 #include "plugin/workspace.h"
 #include "scene/error.h"
 #include "scene/files.h"
 #include "scene/image_io.h"
+#include "scene/point_colors.h"
 
 #include <algorithm>
 #include <map>
@@ -270,35 +272,31 @@ void Pipeline::Refine() {
     SeedOptions seed_options;
     seed_options.shared_camera = options_.shared_camera;
     seed_options.with_points = false;
-    const Seed seed = MakeSeed(predictions_, database, seed_options);
-    const TriangulationInput input = {workspace_.database(),
-                                      options_.image_path,
-                                      workspace_.Scratch("refine"),
-                                      workspace_.log("refine"),
-                                      options_.num_threads};
-    RefineRoundsOptions rounds;
-    rounds.num_rounds = options_.num_refine_rounds;
-    rounds.min_num_observations = options_.min_num_observations;
-    rounds.max_turn_deg = options_.max_turn_deg;
-    rounds.refine_extra_params = options_.refine_extra_params;
-    rounds.num_threads = options_.num_threads;
-    const auto refined = RefineInRounds(colmap_, input, seed.reconstruction, rounds);
-    if (!refined) {
-      Fail(workspace_.log("refine"),
+    Seed seed = MakeSeed(predictions_, database, seed_options);
+    Reconstruction& model = seed.reconstruction;
+    const std::vector<Track> tracks = ReadTracks(database, model);
+    RefineModelOptions refine = options_.refine;
+    refine.num_threads = options_.num_threads;
+    ProgressDisplay display("refine");
+    refine.progress = display.Callback();
+    RefineModelResult result = RefineModel(refine, model, tracks);
+    if (result.feedforward.points3D.empty()) {
+      Fail(workspace_.database(),
            "nothing could be triangulated with the predicted poses",
            "points",
-           "see the log; wrong poses? 'vgtw import' names suspected convention mistakes");
+           "wrong poses? 'vgtw import' names suspected convention mistakes");
+    }
+    for (Reconstruction* triangulated : {&result.feedforward, &result.refined}) {
+      ColorPoints(options_.image_path, *triangulated, options_.num_threads);
     }
     WriteModelOptions write;
     write.overwrite = true;
-    WriteModel(refined->feedforward, workspace_.feedforward(), write);
-    WritePly(workspace_.points(), PointsOf(refined->refined));
-    WriteModel(refined->refined, workspace_.refined(), write);
-    return AsJson(*refined);
+    WriteModel(result.feedforward, workspace_.feedforward(), write);
+    WritePly(workspace_.points(), PointsOf(result.refined));
+    WriteModel(result.refined, workspace_.refined(), write);
+    return AsJson(result);
   });
-  for (const auto& [name, reason] : result["held_views"].items()) {
-    notes_.push_back(name + " keeps its feed-forward pose: " + reason.get<std::string>());
-  }
+  for (const std::string& note : UnrefinedNotes(result.at("views"))) notes_.push_back(note);
 }
 
 PipelineReport Pipeline::Report() {

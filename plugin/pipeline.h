@@ -5,6 +5,7 @@
 #include "evaluation/pose_error.h"
 #include "matching/sift.h"
 #include "plugin/match_stage.h"
+#include "refine/refine_model.h"
 #include "scene/distractor_mask.h"
 #include "scene/reprojection.h"
 
@@ -42,11 +43,7 @@ struct PipelineOptions {
   // For photos that were predicted as pinholes; refinement then finds the lens' distortion.
   CameraModel camera_model = CameraModel::kSimpleRadial;
   bool shared_camera = false;
-  bool refine_extra_params = true;  // distortion, where the camera model has it
-  int num_refine_rounds = 3;
-  // A view with fewer observations of points that three views see keeps its feed-forward pose.
-  int min_num_observations = 30;  // COLMAP asks as many inliers of a pose
-  double max_turn_deg = 5.0;      // so does one that refinement would turn farther
+  RefineModelOptions refine;
 
   int num_threads = 0;
   bool overwrite = false;
@@ -62,7 +59,7 @@ struct ViewReport {
   size_t num_observations = 0;       // in the refined model
   size_t num_supporting = 0;         // of these, of points that three views see
   double rotation_change_deg = 0.0;  // refined against feed-forward, relative to the others
-  bool is_refined = false;           // else it kept its feed-forward pose
+  std::string outcome;               // Name(ViewOutcome): refined, or why not
 };
 
 struct PipelineReport {
@@ -77,7 +74,8 @@ struct PipelineReport {
 
 // Photos and predictions to a COLMAP reconstruction of the static scene:
 //   masks -> features -> matches (ours or by the real colmap) -> feedforward: triangulated with the
-//   predicted poses (real colmap) -> refined: rounds of triangulation and robust bundle adjustment.
+//   predicted poses -> refined: rounds of triangulation and robust bundle adjustment that end no
+//   worse than they began (refine/refine_model.h).
 // Stages that are up to date are skipped. Throws Error if a stage leaves nothing to go on with.
 PipelineReport RunPipeline(const PipelineOptions& options);
 

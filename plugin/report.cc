@@ -3,6 +3,7 @@
 
 #include "bridge/colmap_model.h"
 #include "bridge/predictions.h"
+#include "plugin/refine_report.h"
 #include "plugin/table.h"
 #include "scene/error.h"
 
@@ -46,7 +47,7 @@ std::vector<ViewReport> ReportViews(const json& stages,
     view.num_observations = NumObservations(image);
     view.rotation_change_deg = change_deg_by_name[image.name];
     view.num_supporting = supporting.at(id);
-    view.is_refined = !stages.at("refine").at("result").at("held_views").contains(image.name);
+    view.outcome = stages.at("refine").at("result").at("views").at(image.name).at("outcome");
     views.push_back(view);
   }
   std::sort(views.begin(), views.end(), [](const ViewReport& a, const ViewReport& b) {
@@ -102,11 +103,7 @@ json OptionsAsJson(const PipelineOptions& options) {
             {"focal", options.match.views.pair.uncertainty.focal},
             {"depth", options.match.views.pair.uncertainty.depth},
             {"sequential_overlap", options.sequential_overlap}}},
-          {"refine",
-           {{"num_rounds", options.num_refine_rounds},
-            {"min_num_observations", options.min_num_observations},
-            {"max_turn_deg", options.max_turn_deg},
-            {"refine_extra_params", options.refine_extra_params}}}};
+          {"refine", AsJson(options.refine)}};
 }
 
 json AsJson(const ReprojectionStats& stats) {
@@ -140,22 +137,6 @@ json AsJson(const PoseComparison& comparison) {
           {"views", views}};
 }
 
-json AsJson(const RefineRoundsResult& result) {
-  json rounds = json::array();
-  for (const BundleAdjustmentSummary& round : result.rounds) {
-    rounds.push_back({{"success", round.success},
-                      {"message", round.message},
-                      {"num_residuals", round.num_residuals},
-                      {"initial_cost", round.initial_cost},
-                      {"final_cost", round.final_cost},
-                      {"num_iterations", round.num_iterations},
-                      {"gauge", round.gauge}});
-  }
-  json held_views = json::object();
-  for (const HeldView& view : result.held_views) held_views[view.name] = view.reason;
-  return {{"rounds", rounds}, {"held_views", held_views}};
-}
-
 json AsJson(const PipelineReport& report) {
   json views = json::array();
   for (const ViewReport& view : report.views) {
@@ -166,7 +147,7 @@ json AsJson(const PipelineReport& report) {
                      {"num_observations", view.num_observations},
                      {"num_supporting_observations", view.num_supporting},
                      {"rotation_change_deg", view.rotation_change_deg},
-                     {"status", view.is_refined ? "refined" : "kept feed-forward pose"}});
+                     {"status", view.outcome}});
   }
   json object = {{"views", views},
                  {"feedforward", AsJson(report.feedforward)},
@@ -225,7 +206,7 @@ std::string FormatReport(const PipelineReport& report) {
                      std::to_string(view.num_observations),
                      std::to_string(view.num_supporting),
                      FormatNumber(view.rotation_change_deg, 3),
-                     view.is_refined ? "refined" : "kept"});
+                     view.outcome});
   }
   std::string text = FormatTable(views) + "\n";
   text +=

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "plugin/pipeline.h"
-#include "plugin/refine_rounds.h"
 #include "plugin/workspace.h"
 #include "scene/rigid3d.h"
 
@@ -20,7 +19,6 @@ nlohmann::json OptionsAsJson(const PipelineOptions& options);
 
 nlohmann::json AsJson(const ReprojectionStats& stats);
 nlohmann::json AsJson(const PoseComparison& comparison);
-nlohmann::json AsJson(const RefineRoundsResult& result);
 nlohmann::json AsJson(const PipelineReport& report);
 
 // Poses by image name of a COLMAP model or a predictions folder. Throws Error if it is neither.

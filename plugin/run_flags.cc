@@ -15,21 +15,13 @@ void RunFlags::Declare(Flags& flags) {
       .Add("sequential_overlap", &options_.sequential_overlap, "Neighbours of a sequence")
       .Add("use_gpu", &options_.use_gpu, "Let colmap use its GPU code");
   match_.Declare(flags);
-  flags.Group("Refinement")
+  flags.Group("Cameras")
       .AddChoice("camera_model",
                  &camera_model_,
                  {"SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"},
                  "Lens of photos that were predicted as pinholes")
-      .Add("shared_camera", &options_.shared_camera, "One camera for all photos of a size")
-      .Add("refine_extra_params",
-           &options_.refine_extra_params,
-           "Refine lens distortion, where the model has it")
-      .Add("num_rounds", &options_.num_refine_rounds, "Triangulate and adjust at most this often")
-      .Add("min_num_observations",
-           &options_.min_num_observations,
-           "A photo with fewer observations of points that three photos see keeps its "
-           "feed-forward pose")
-      .Add("max_turn_deg", &options_.max_turn_deg, "So does one that would turn farther, degrees");
+      .Add("shared_camera", &options_.shared_camera, "One camera for all photos of a size");
+  refine_.Declare(flags);
 }
 
 void RunFlags::ApplyTo(PipelineOptions& options) const {
@@ -43,10 +35,7 @@ void RunFlags::ApplyTo(PipelineOptions& options) const {
   options.use_gpu = options_.use_gpu;
   options.camera_model = *FindCameraModel(camera_model_);
   options.shared_camera = options_.shared_camera;
-  options.refine_extra_params = options_.refine_extra_params;
-  options.num_refine_rounds = options_.num_refine_rounds;
-  options.min_num_observations = options_.min_num_observations;
-  options.max_turn_deg = options_.max_turn_deg;
+  refine_.ApplyTo(options.refine);
 }
 
 }  // namespace vgtw

@@ -5,6 +5,7 @@
 #include "plugin/mask_flags.h"
 #include "plugin/match_flags.h"
 #include "plugin/pipeline.h"
+#include "plugin/refine_flags.h"
 
 #include <string>
 
@@ -20,6 +21,7 @@ class RunFlags {
  private:
   MaskFlags mask_;
   MatchFlags match_;
+  RefineFlags refine_;
   PipelineOptions options_;
   std::string matcher_ = "guided";
   std::string camera_model_ = "SIMPLE_RADIAL";

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "scene/progress.h"
+#include "scene/reconstruction.h"
+
+#include <filesystem>
+
+namespace vgtw {
+
+// Gives each point the mean colour of the pixels at its observations. A photo per thread is in
+// memory at a time. Observations outside of their photo, and photos that `image_path` lacks, do not
+// count; points without any others stay as they are. Throws Error if a photo cannot be read.
+void ColorPoints(const std::filesystem::path& image_path,
+                 Reconstruction& model,
+                 int num_threads = 0,
+                 const ProgressCallback& progress = {});
+
+}  // namespace vgtw
