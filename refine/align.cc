@@ -38,6 +38,12 @@ Eigen::Quaterniond MedianRotation(const std::vector<PosePair>& pairs) {
   return median;
 }
 
+double LargestNorm(const std::vector<Eigen::Vector3d>& points) {
+  double largest = 0.0;
+  for (const Eigen::Vector3d& point : points) largest = std::max(largest, point.norm());
+  return largest;
+}
+
 // Scale and shift for a given rotation, reweighted likewise.
 Sim3d MedianScaleAndShift(const std::vector<PosePair>& pairs, const Eigen::Quaterniond& rotation) {
   std::vector<Eigen::Vector3d> from, to;
@@ -47,6 +53,9 @@ Sim3d MedianScaleAndShift(const std::vector<PosePair>& pairs, const Eigen::Quate
   }
   Sim3d similarity;
   similarity.rotation = rotation;
+  // Of this size are differences of centres that coincide, and their products.
+  const double rounding = 1e-12 * LargestNorm(to);
+  const double product_rounding = 1e-12 * LargestNorm(from) * rounding;
   std::vector<double> weights(from.size(), 1.0);
   for (int i = 0; i < kMaxIterations; ++i) {
     double total = 0.0;
@@ -67,11 +76,12 @@ Sim3d MedianScaleAndShift(const std::vector<PosePair>& pairs, const Eigen::Quate
       square += weights[k] * (from[k] - mean_from).squaredNorm();
       extent = std::max(extent, (to[k] - mean_to).norm());
     }
-    // Centres that run against each other have no similarity; their scale is left as it is.
-    if (product > 0.0 && square > 0.0) similarity.scale = product / square;
+    // Centres that coincide or run against each other have no similarity; the scale is left as it
+    // is.
+    if (product > product_rounding * total) similarity.scale = product / square;
     const Eigen::Vector3d before = similarity.translation;
     similarity.translation = mean_to - similarity.scale * mean_from;
-    if ((similarity.translation - before).norm() <= 1e-12 * extent) break;
+    if (extent <= rounding || (similarity.translation - before).norm() <= 1e-12 * extent) break;
     for (size_t k = 0; k < from.size(); ++k) {
       const double distance = (similarity.scale * from[k] + similarity.translation - to[k]).norm();
       weights[k] = 1.0 / std::max(distance, 1e-9 * extent);
