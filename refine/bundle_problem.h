@@ -46,6 +46,12 @@ class BundleProblem {
 
   const Gauge& gauge() const { return gauge_; }
   int num_residuals() const { return problem_.NumResiduals(); }
+  const ceres::Problem& problem() const { return problem_; }
+  const ceres::LossFunction& loss() const { return *loss_; }  // of the observations
+  const Sim3d& working_from_world() const { return working_from_world_; }
+  const std::vector<std::array<double, kNumPoseParams>>& poses() const { return poses_; }
+  const std::vector<Eigen::Vector3d>& points() const { return points_; }
+  const std::map<CameraId, std::vector<double>>& params() const { return params_; }
   BundlePriorsSummary SummarizePriors() const { return priors_->Summarize(); }
 
   ceres::Solver::Summary Solve();
