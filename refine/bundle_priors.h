@@ -60,9 +60,11 @@ struct DepthPrior {
   double log_sigma = 0.0;  // about the relative sigma, larger where confidence is low; > 0
 };
 
-// Residual:  log(z / (s (e^v D + t m))) / sigma  with the point's depth z in the camera, the
-// predicted depth D, their median m in the view, one unknown scale s of all views, and per view a
-// scale e^v and a shift t. The sigmas of v and t keep views with few depths determined.
+// Residual:  log((z / s - t m) / (e^v D)) / sigma,  that is  z = s (e^v D + t m),  with the point's
+// depth z in the camera, the predicted depth D, their median m in the view, one unknown scale s of
+// all views, and per view a scale e^v and a shift t. The sigmas of v and t keep views with few
+// depths determined. (The error is measured in D: in z, where a shift dilutes it, the least cost
+// would be at shifts that flatten the scene.)
 struct DepthPriors {
   std::map<ImageId, std::vector<DepthPrior>> by_image;
   bool free_view_scales = true;

@@ -239,8 +239,8 @@ void PriorBlocks::AddDepthsOfView(ImageId image_id, const std::vector<UsedDepth>
   double* view = depth_views_.emplace(image_id, ViewBlock{}).first->second.data();
   for (const UsedDepth& depth : used) {
     Add(depths_,
-        MakeDepthPriorCost({depth.prior.depth, median_depth, depth.depth},
-                           priors_.sigma_px / depth.prior.log_sigma),
+        MakeDepthPriorCost(
+            depth.prior.depth, median_depth, priors_.sigma_px / depth.prior.log_sigma),
         {targets_.poses.at(image_id), depth.point, &log_depth_scale_, view});
   }
   HoldView(view);

@@ -101,7 +101,10 @@ T ExtendedLog(const T& x) {
 
 class DepthPriorCost {
  public:
-  DepthPriorCost(const DepthPriorInput& input, double weight) : input_(input), weight_(weight) {}
+  DepthPriorCost(double depth, double median_depth, double weight)
+      : log_relative_depth_(std::log(depth / median_depth)),
+        median_depth_(median_depth),
+        weight_(weight) {}
 
   template <typename T>
   bool operator()(const T* cam_from_world,
@@ -113,17 +116,14 @@ class DepthPriorCost {
     const Vector3<T> point_in_cam =
         ConstQuaternionMap<T>(cam_from_world) * ConstVector3Map<T>(point_in_world) +
         ConstVector3Map<T>(cam_from_world + 4);
-    const double relative_depth = input_.depth / input_.median_depth;
-    const T log_z =
-        ExtendedLog(T(point_in_cam.z() / input_.initial_depth)) + std::log(input_.initial_depth);
-    const T log_predicted = ExtendedLog(T(exp(view[0]) * relative_depth + view[1])) +
-                            std::log(input_.median_depth) + log_scale[0];
-    residual[0] = weight_ * (log_z - log_predicted);
+    const T unshifted = point_in_cam.z() * exp(-log_scale[0]) / median_depth_ - view[1];
+    residual[0] = weight_ * (ExtendedLog(unshifted) - view[0] - log_relative_depth_);
     return true;
   }
 
  private:
-  DepthPriorInput input_;
+  double log_relative_depth_;
+  double median_depth_;
   double weight_;
 };
 
@@ -149,10 +149,11 @@ std::unique_ptr<ceres::CostFunction> MakeFocalPriorCost(CameraModel model,
   return std::make_unique<FocalPriorCost>(GetCameraModelInfo(model), focal_lengths, weight);
 }
 
-std::unique_ptr<ceres::CostFunction> MakeDepthPriorCost(const DepthPriorInput& input,
+std::unique_ptr<ceres::CostFunction> MakeDepthPriorCost(double depth,
+                                                        double median_depth,
                                                         double weight) {
   using Cost = ceres::AutoDiffCostFunction<DepthPriorCost, 1, kNumPoseParams, 3, 1, 2>;
-  return std::make_unique<Cost>(new DepthPriorCost(input, weight));
+  return std::make_unique<Cost>(new DepthPriorCost(depth, median_depth, weight));
 }
 
 }  // namespace vgtw

@@ -30,16 +30,12 @@ std::unique_ptr<ceres::CostFunction> MakeFocalPriorCost(CameraModel model,
                                                         const Eigen::Vector2d& focal_lengths,
                                                         double weight);
 
-// Residual [1]:  log(z / (s (e^v D + t m))).
-// Blocks: pose, point, log s [1], view [2] = (v, t). Below a hundredth of `initial_depth`, the
-// point's depth at the start, and of m the logarithms go on as straight lines, so that points
-// behind the camera are drawn to its front.
-struct DepthPriorInput {
-  double depth = 0.0;          // D
-  double median_depth = 0.0;   // m
-  double initial_depth = 0.0;  // of z
-};
-std::unique_ptr<ceres::CostFunction> MakeDepthPriorCost(const DepthPriorInput& input,
+// Residual [1]:  log((z / s - t m) / (e^v D)).
+// Blocks: pose, point, log s [1], view [2] = (v, t). Where z / s - t m is below a hundredth of m
+// the logarithm goes on as a straight line, so that points behind the camera are drawn to its
+// front.
+std::unique_ptr<ceres::CostFunction> MakeDepthPriorCost(double depth,
+                                                        double median_depth,
                                                         double weight);
 
 }  // namespace vgtw

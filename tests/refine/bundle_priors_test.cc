@@ -5,6 +5,7 @@
 #include "refine/align.h"
 #include "refine/bundle_adjustment.h"
 #include "scene/random.h"
+#include "tests/refine/synthetic_priors.h"
 #include "tests/support/synthetic_model.h"
 
 #include <cmath>
@@ -17,89 +18,6 @@
 
 namespace vgtw {
 namespace {
-
-// Some world that is not the model's.
-const Sim3d kReferenceFromWorld = {
-    2.5, RotationAboutAxis(Eigen::Vector3d(1.0, -2.0, 0.5).normalized(), 70.0), {10.0, -4.0, 3.0}};
-
-std::map<ImageId, Rigid3d> PosesOf(const Reconstruction& model) {
-  std::map<ImageId, Rigid3d> poses;
-  for (const auto& [image_id, image] : model.images) poses[image_id] = image.cam_from_world;
-  return poses;
-}
-
-// Errors of this size in the priors, which state it as their sigma.
-struct PriorErrors {
-  double rotation_deg = 0.0;
-  double centre = 0.0;  // per axis, in units of the model
-};
-constexpr PriorErrors kStatedForExact = {0.1, 0.01};
-
-PosePriors PosePriorsOf(const Reconstruction& truth, const PriorErrors& errors, uint64_t seed) {
-  RandomStream random(HashKey({seed}));
-  const bool exact = errors.centre == 0.0;
-  PosePriors priors;
-  for (const auto& [image_id, image] : truth.images) {
-    Rigid3d pose = image.cam_from_world;
-    const Eigen::Vector3d turn_deg = errors.rotation_deg * random.NormalVector();
-    const Eigen::Vector3d centre = OriginInSource(pose) + errors.centre * random.NormalVector();
-    if (!exact) {
-      pose.rotation =
-          (RotationAboutAxis(turn_deg.normalized(), turn_deg.norm()) * pose.rotation).normalized();
-      pose.translation = -(pose.rotation * centre);
-    }
-    const PriorErrors& stated = exact ? kStatedForExact : errors;
-    priors.by_image[image_id] = {TransformCamera(kReferenceFromWorld, pose),
-                                 stated.rotation_deg,
-                                 kReferenceFromWorld.scale * stated.centre};
-  }
-  return priors;
-}
-
-CentrePriors CentrePriorsOf(const Reconstruction& truth, double sigma, uint64_t seed) {
-  RandomStream random(HashKey({seed}));
-  CentrePriors priors;
-  for (const auto& [image_id, image] : truth.images) {
-    const Eigen::Vector3d centre =
-        OriginInSource(image.cam_from_world) + sigma * random.NormalVector();
-    priors.by_image[image_id] = {
-        kReferenceFromWorld * centre,
-        Eigen::Vector3d::Constant(kReferenceFromWorld.scale * std::max(sigma, 0.01))};
-  }
-  return priors;
-}
-
-std::map<CameraId, FocalPrior> FocalPriorsOf(const Reconstruction& truth) {
-  std::map<CameraId, FocalPrior> priors;
-  for (const auto& [camera_id, camera] : truth.cameras) {
-    priors[camera_id] = {camera.FocalLengthX(), camera.FocalLengthY(), 0.01};
-  }
-  return priors;
-}
-
-// Depths of the truth in a unit that is half the scene's.
-DepthPriors DepthPriorsOf(const Reconstruction& truth, double log_sigma, uint64_t seed) {
-  RandomStream random(HashKey({seed}));
-  DepthPriors priors;
-  for (const auto& [image_id, image] : truth.images) {
-    for (uint32_t i = 0; i < image.points2D.size(); ++i) {
-      const Point2D& point2D = image.points2D[i];
-      const double depth = (image.cam_from_world * truth.points3D.at(point2D.point3D_id).xyz).z();
-      const double error = std::exp(log_sigma * random.Normal());
-      priors.by_image[image_id].push_back({i, 2.0 * depth * error, std::max(log_sigma, 0.01)});
-    }
-  }
-  return priors;
-}
-
-BundlePriors ExactPriors(const Reconstruction& truth) {
-  BundlePriors priors;
-  priors.poses = PosePriorsOf(truth, {}, 0);
-  priors.centres = CentrePriorsOf(truth, 0.0, 0);
-  priors.focal_lengths = FocalPriorsOf(truth);
-  priors.depths = DepthPriorsOf(truth, 0.0, 0);
-  return priors;
-}
 
 PoseComparison Compare(const Reconstruction& estimate, const Reconstruction& truth) {
   return ComparePoses(CamFromWorldByName(estimate), CamFromWorldByName(truth)).value();
@@ -179,63 +97,142 @@ TEST(BundlePriors, ASimilarityOfTheModelChangesNothing) {
   EXPECT_LT(Compare(moved, start).centre_rmse_percent, 1e-3);
 }
 
-// The share of `weak` in the error of an image's centre, over the truth's extent.
-double WeakError(const Reconstruction& model, const Reconstruction& truth, ImageId weak) {
-  // The other five images define the alignment.
+// Distance of an image's centre from the truth, aligned by the other images.
+double CentreError(const Reconstruction& model, const Reconstruction& truth, ImageId image_id) {
   std::vector<Eigen::Vector3d> centres, true_centres;
-  for (const auto& [image_id, image] : truth.images) {
-    if (image_id == weak) continue;
-    centres.push_back(OriginInSource(model.images.at(image_id).cam_from_world));
+  for (const auto& [other_id, image] : truth.images) {
+    if (other_id == image_id) continue;
+    centres.push_back(OriginInSource(model.images.at(other_id).cam_from_world));
     true_centres.push_back(OriginInSource(image.cam_from_world));
   }
   const Sim3d truth_from_model = EstimateSim3d(centres, true_centres).value();
-  return (truth_from_model * OriginInSource(model.images.at(weak).cam_from_world) -
-          OriginInSource(truth.images.at(weak).cam_from_world))
+  return (truth_from_model * OriginInSource(model.images.at(image_id).cam_from_world) -
+          OriginInSource(truth.images.at(image_id).cam_from_world))
       .norm();
 }
 
-// All but the first `num_kept` observations of an image removed.
-void Weaken(Reconstruction& model, ImageId image_id, size_t num_kept) {
-  for (uint32_t i = static_cast<uint32_t>(num_kept); i < model.images.at(image_id).points2D.size();
-       ++i) {
-    RemoveObservation(model, {image_id, i});
+// Root mean square over 8 scenes of the error of an image with few observations of 1 px, its pose
+// adjusted from a wrong start with the priors that `make_priors(truth, seed)` gives, and without.
+struct WeakViewErrors {
+  double with_priors = 0.0;
+  double without = 0.0;
+};
+template <typename MakePriors>
+WeakViewErrors AdjustWeakViews(uint32_t num_observations, const MakePriors& make_priors) {
+  constexpr unsigned kNumScenes = 8;
+  constexpr ImageId kWeak = 3;
+  WeakViewErrors squared;
+  for (unsigned seed = 0; seed < kNumScenes; ++seed) {
+    SyntheticModelOptions model_options;
+    model_options.seed = seed;
+    model_options.num_points = 60;
+    const Reconstruction truth = MakeSyntheticModel(model_options);
+    Reconstruction without = truth;
+    ProjectAgain(without, 1.0, seed);
+    PerturbPoses(without, 0.2, 0.05, seed);
+    for (uint32_t i = num_observations; i < 60; ++i) RemoveObservation(without, {kWeak, i});
+    Reconstruction with_priors = without;
+    BundleAdjustmentOptions options;
+    options.refine_focal_length = false;
+    EXPECT_TRUE(AdjustBundle(options, without).success);
+    options.priors = make_priors(truth, seed);
+    EXPECT_TRUE(AdjustBundle(options, with_priors).success);
+    squared.with_priors += std::pow(CentreError(with_priors, truth, kWeak), 2) / kNumScenes;
+    squared.without += std::pow(CentreError(without, truth, kWeak), 2) / kNumScenes;
+  }
+  return {std::sqrt(squared.with_priors), std::sqrt(squared.without)};
+}
+
+TEST(BundlePriors, PosesBringAWeakViewNearerToTheTruth) {
+  for (const uint32_t num_observations : {3, 5, 10}) {
+    const WeakViewErrors errors =
+        AdjustWeakViews(num_observations, [](const Reconstruction& truth, unsigned seed) {
+          BundlePriors priors;
+          priors.poses = PosePriorsOf(truth, {0.2, 0.03}, seed);
+          return priors;
+        });
+    SCOPED_TRACE(num_observations);
+    EXPECT_LT(errors.with_priors, errors.without);
+    // Nor is it worse than the priors alone, of three axes with this sigma each.
+    EXPECT_LT(errors.with_priors, std::sqrt(3.0) * 0.03);
   }
 }
 
-TEST(BundlePriors, AWeakViewEndsNearerToTheTruth) {
-  const PriorErrors errors = {0.2, 0.03};
-  for (const size_t num_observations : {3, 5, 10}) {
-    double with_squared = 0.0;
-    double without_squared = 0.0;
-    for (unsigned seed = 0; seed < 8; ++seed) {
-      SyntheticModelOptions model_options;
-      model_options.seed = seed;
-      model_options.num_points = 60;
-      const Reconstruction truth = MakeSyntheticModel(model_options);
-      const PosePriors priors = PosePriorsOf(truth, errors, seed);
-      Reconstruction start = truth;
-      ProjectAgain(start, 1.0, seed);
-      for (auto& [image_id, image] : start.images) {
-        // As a seed is: at the poses of the priors.
-        image.cam_from_world = TransformCamera(Inverse(kReferenceFromWorld),
-                                               priors.by_image.at(image_id).cam_from_reference);
-      }
-      Weaken(start, 3, num_observations);
-      BundleAdjustmentOptions options;
-      options.refine_focal_length = false;
-      Reconstruction without = start;
-      ASSERT_TRUE(AdjustBundle(options, without).success);
-      options.priors.poses = priors;
-      Reconstruction with = start;
-      ASSERT_TRUE(AdjustBundle(options, with).success);
-      with_squared += std::pow(WeakError(with, truth, 3), 2);
-      without_squared += std::pow(WeakError(without, truth, 3), 2);
-    }
-    SCOPED_TRACE(num_observations);
-    EXPECT_LT(with_squared, without_squared);
-    // Nor is it worse than the priors alone, of three axes with this sigma each.
-    EXPECT_LT(std::sqrt(with_squared / 20.0), std::sqrt(3.0) * errors.centre);
+TEST(BundlePriors, KnownCentresBringAWeakViewNearerToTheTruth) {
+  const WeakViewErrors errors = AdjustWeakViews(4, [](const Reconstruction& truth, unsigned seed) {
+    BundlePriors priors;
+    priors.centres = CentrePriorsOf(truth, 0.02, seed);
+    return priors;
+  });
+  EXPECT_LT(errors.with_priors, errors.without);
+  // What the prior and an alignment by five others leave, and 15 % for chance in 24 coordinates.
+  EXPECT_LT(errors.with_priors, 1.15 * std::sqrt(3.0 * (1.0 + 1.0 / 5.0)) * 0.02);
+}
+
+// Root mean square distance of points from the truth.
+double PointError(const Reconstruction& model, const Reconstruction& truth) {
+  double squared = 0.0;
+  for (const auto& [point3D_id, point] : truth.points3D) {
+    squared += (model.points3D.at(point3D_id).xyz - point.xyz).squaredNorm();
   }
+  return std::sqrt(squared / static_cast<double>(truth.points3D.size()));
+}
+
+// Three cameras on an arc of 2 degrees, 4 away: pixels of sigma 1 know depths to about 4^2 / (500 *
+// 0.14 * sqrt(3)) = 0.13, three priors of 2 % to 0.046.
+TEST(BundlePriors, DepthsPlacePointsOfSmallParallax) {
+  SyntheticModelOptions model_options;
+  model_options.num_images = 3;
+  model_options.arc_deg = 2.0;
+  const Reconstruction truth = MakeSyntheticModel(model_options);
+  Reconstruction without = truth;
+  ProjectAgain(without, 1.0, 20);
+  BundleAdjustmentOptions options;
+  options.refine_poses = false;
+  options.refine_focal_length = false;
+  Reconstruction with_priors = without;
+  ASSERT_TRUE(AdjustBundle(options, without).success);
+  options.priors.depths = DepthPriorsOf(truth, 0.02, 21);
+  const BundleAdjustmentSummary summary = AdjustBundle(options, with_priors);
+  ASSERT_TRUE(summary.success);
+  EXPECT_NEAR(PointError(without, truth), 0.13, 0.02);
+  EXPECT_LT(PointError(with_priors, truth), 0.046);
+  // 360 depths of 2 %: 0.1 %, and the views' own scales and shifts.
+  EXPECT_NEAR(*summary.priors.depth_scale, 0.5, 0.01);
+}
+
+TEST(BundlePriors, DepthsMayHaveAScaleAndAShiftPerView) {
+  const Reconstruction truth = MakeSyntheticModel({});
+  BundleAdjustmentOptions options;
+  options.refine_focal_length = false;
+  options.priors.depths = DepthPriorsOf(truth, 0.0, 0);
+  DepthPriors& depths = options.priors.depths;
+  RandomStream random(22);
+  for (auto& [image_id, priors] : depths.by_image) {
+    const double scale = std::exp(0.2 * random.Normal());
+    const double shift = 0.8 * random.Normal();
+    for (DepthPrior& prior : priors) prior.depth = scale * prior.depth + shift;
+  }
+  depths.view_scale_log_sigma = 10.0;
+  depths.view_shift_sigma = 10.0;
+  Reconstruction adjusted = truth;
+  const BundleAdjustmentSummary summary = AdjustBundle(options, adjusted);
+  ASSERT_TRUE(summary.success);
+  EXPECT_GT(summary.priors.depths.initial_rms, 5.0);
+  // In sigmas of 1 %; the weak priors of scales and shifts pull by 1e-6 of the depths' weight.
+  EXPECT_LT(summary.priors.depths.final_rms, 1e-3);
+  EXPECT_LT(Compare(adjusted, truth).centre_rmse_percent, 1e-3);
+
+  // The switches: neither alone explains both.
+  for (const bool free_scales : {false, true}) {
+    depths.free_view_scales = free_scales;
+    depths.free_view_shifts = !free_scales;
+    Reconstruction either = truth;
+    EXPECT_GT(AdjustBundle(options, either).priors.depths.final_rms, 1.0);
+  }
+  depths.free_view_scales = false;
+  Reconstruction neither = truth;
+  EXPECT_EQ(AdjustBundle(options, neither).num_residuals, 1440u + 720u);
 }
 
 TEST(BundlePriors, ATwentiethOfWildOnesDoesNoHarm) {
@@ -380,6 +377,32 @@ TEST(BundlePriors, RefuseWhatIsNoPrior) {
   wrong = right;
   wrong.sigma_px = 0.0;
   EXPECT_THROW(wrong.Check(), std::invalid_argument);
+}
+
+// Priors whose errors are three times what they state, measured thrice.
+TEST(MeasuredSigmaFactor, MeasuresThePriorsOfAnAdjustment) {
+  SyntheticModelOptions model_options;
+  model_options.num_images = 30;
+  const Reconstruction truth = MakeSyntheticModel(model_options);
+  BundleAdjustmentOptions options;
+  options.priors.poses = PosePriorsOf(truth, {0.6, 0.06}, 23);
+  double rotations = 1.0 / 3.0;
+  double centres = 1.0 / 3.0;
+  for (int round = 0; round < 4; ++round) {
+    for (auto& [image_id, prior] : options.priors.poses.by_image) {
+      prior.rotation_sigma_deg = 0.6 * rotations;
+      prior.centre_sigma = kReferenceFromWorld.scale * 0.06 * centres;
+    }
+    Reconstruction adjusted = truth;
+    ProjectAgain(adjusted, 0.5, 24);
+    const BundleAdjustmentSummary summary = AdjustBundle(options, adjusted);
+    ASSERT_TRUE(summary.success);
+    rotations *= MeasuredSigmaFactor(summary.priors.rotations.residuals);
+    centres *= MeasuredSigmaFactor(summary.priors.pose_centres.residuals);
+  }
+  // Of 90 residuals a median has a sigma of 12 %.
+  EXPECT_NEAR(rotations, 1.0, 0.25);
+  EXPECT_NEAR(centres, 1.0, 0.25);
 }
 
 TEST(EstimateReferenceFromWorld, SurvivesAThirdOfWrongPriors) {

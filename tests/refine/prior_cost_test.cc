@@ -151,24 +151,25 @@ struct DepthBlocks {
 
 TEST(PriorCost, DepthsCountInLogsOfScaledAndShiftedPredictions) {
   const DepthBlocks depth;
-  const auto cost = MakeDepthPriorCost({2.0, 4.0, 5.0}, 10.0);
+  const auto cost = MakeDepthPriorCost(2.0, 4.0, 10.0);
   // 2 (1.1 * 2 + 0.2 * 4) = 6.
   EXPECT_NEAR(Evaluate(*cost, depth.blocks())[0], 0.0, 1e-12);
   DepthBlocks farther = depth;
-  farther.point[2] = 5.6;
+  farther.point[2] = 5.44;
+  // 2 (1.1 * 2.2 + 0.2 * 4) = 6.44: a tenth more than predicted.
   EXPECT_NEAR(Evaluate(*cost, farther.blocks())[0], 10.0 * std::log(1.1), 1e-12);
 }
 
 TEST(PriorCost, DepthsHaveDerivativesEvenBehindTheCamera) {
   const PoseManifold pose;
   DepthBlocks depth;
-  const auto cost = MakeDepthPriorCost({2.0, 4.0, 5.0}, 10.0);
-  for (const double z : {4.0, 0.2, -0.9, -3.0}) {
+  const auto cost = MakeDepthPriorCost(2.0, 4.0, 10.0);
+  for (const double z : {4.0, 1.0, 0.6, -3.0}) {
     depth.point[2] = z;
     SCOPED_TRACE(z);
     ExpectDerivatives(*cost, depth.blocks(), {&pose, nullptr, nullptr, nullptr});
   }
-  depth.view = {0.0, -0.7};  // the prediction itself is shifted behind the camera
+  depth.view = {0.0, -0.7};
   ExpectDerivatives(*cost, depth.blocks(), {&pose, nullptr, nullptr, nullptr});
 }
 
