@@ -50,7 +50,11 @@ FilterSummary FilterObservations(const FilterOptions& options, Reconstruction& r
       const Image& image = reconstruction.images.at(element.image_id);
       const std::optional<double> error_px =
           ReprojectionError(reconstruction, image, image.points2D.at(element.point2D_idx));
-      if (error_px && *error_px <= options.max_reprojection_error_px) {
+      const auto own = options.max_reprojection_error_px_by_image.find(element.image_id);
+      const double max_px = own == options.max_reprojection_error_px_by_image.end()
+                                ? options.max_reprojection_error_px
+                                : own->second;
+      if (error_px && *error_px <= max_px) {
         unit_rays.push_back((point.xyz - OriginInSource(image.cam_from_world)).normalized());
       } else {
         bad.push_back(element);

@@ -4,6 +4,7 @@
 #include "scene/reconstruction.h"
 
 #include <cstddef>
+#include <map>
 
 namespace vgtw {
 
@@ -12,6 +13,7 @@ struct FilterOptions {
   double max_reprojection_error_px = 4.0;
   // A point stays if the rays of some pair of its observations meet at this angle; in [0, 90).
   double min_triangulation_angle_deg = 1.5;
+  std::map<ImageId, double> max_reprojection_error_px_by_image = {};  // where another limit holds
 
   void Check() const;
 };

@@ -4,6 +4,7 @@
 #include "refine/ray_point.h"
 #include "scene/error.h"
 #include "scene/parallel.h"
+#include "scene/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -120,6 +121,14 @@ std::map<ImageId, double> HeldOutJudge::MeanPxByImage(const Errors& errors) cons
   for (const auto& [id, mean] : means)
     mean_px[id] = scale_px_ * std::sqrt(std::expm1(mean.Value()));
   return mean_px;
+}
+
+std::map<ImageId, double> HeldOutJudge::MedianPxByImage(const Errors& errors) const {
+  std::map<ImageId, std::vector<double>> errors_by_image;
+  for (size_t i = 0; i < errors.size(); ++i) errors_by_image[image_ids_[i]].push_back(errors[i]);
+  std::map<ImageId, double> median_px;
+  for (auto& [id, errors_px] : errors_by_image) median_px[id] = Median(std::move(errors_px));
+  return median_px;
 }
 
 std::map<ImageId, size_t> HeldOutJudge::NumObservations() const {

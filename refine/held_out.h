@@ -35,6 +35,7 @@ class HeldOutJudge {
   // observations.
   double MeanPx(const Errors& errors) const;
   std::map<ImageId, double> MeanPxByImage(const Errors& errors) const;
+  std::map<ImageId, double> MedianPxByImage(const Errors& errors) const;
   std::map<ImageId, size_t> NumObservations() const;
 
   // Images whose observations got worse by more than `num_sigmas` standard errors of the mean

@@ -87,8 +87,9 @@ std::map<ImageId, size_t> NumSupportingObservations(const Reconstruction& model)
 // Coarse to fine, and never worse than the seed. Each round triangulates the tracks, adjusts
 // robustly at the scale of the error that is measured and drops what does not fit; the first limit
 // follows from the error of the seed itself. Tracks that were held out judge each round: a view
-// that they find worse goes back to its last good pose, the round is repeated without it, and a
-// round that does not lower their mean error is undone. So with
+// that they find worse than the seed, or much worse than the round before, goes back to its last
+// good pose, the round is repeated without it, and a round that raises their mean error is undone.
+// So with
 //   held_out = the mean error of all observations held out, robust and bounded (refine/held_out.h)
 // held_out_after_px <= held_out_before_px, and where nothing helps the refined model has the seed's
 // poses and intrinsics bit by bit. Models stay in the world of the seed (refine/align.h).

@@ -3,8 +3,10 @@
 
 #include "refine/filter.h"
 #include "scene/reprojection.h"
+#include "scene/statistics.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace vgtw {
 namespace {
@@ -29,11 +31,11 @@ std::vector<Track> WithoutImages(const std::vector<Track>& tracks, const std::se
 }
 
 // Images that too few observations tie down go, until all that stay are tied down.
-void DropWeakImages(int min_num_observations, Reconstruction& model) {
+void DropWeakImages(size_t min_num_observations, Reconstruction& model) {
   for (bool is_done = false; !is_done;) {
     is_done = true;
     for (const auto& [id, num] : NumSupportingObservations(model)) {
-      if (num >= static_cast<size_t>(min_num_observations)) continue;
+      if (num >= min_num_observations) continue;
       for (uint32_t idx = 0; idx < model.images.at(id).points2D.size(); ++idx) {
         if (!model.images.at(id).points2D[idx].HasPoint3D()) continue;
         RemoveObservation(model, {id, idx});
@@ -43,10 +45,33 @@ void DropWeakImages(int min_num_observations, Reconstruction& model) {
   }
 }
 
+// Of images with observations.
+std::map<ImageId, double> MedianErrorsPx(const Reconstruction& model) {
+  std::map<ImageId, double> medians;
+  for (const auto& [id, image] : model.images) {
+    std::vector<double> errors;
+    for (const Point2D& point2D : image.points2D) {
+      if (!point2D.HasPoint3D()) continue;
+      if (const auto error = ReprojectionError(model, image, point2D)) errors.push_back(*error);
+    }
+    if (!errors.empty()) medians[id] = Median(std::move(errors));
+  }
+  return medians;
+}
+
 }  // namespace
 
-void RoundLimits::Tighten(double median_px) {
-  max_error_px = std::min(max_error_px, std::max(kMaxMedians * median_px, final_px));
+double RoundLimits::MedianPx() const {
+  std::vector<double> limits;
+  for (const auto& [id, limit_px] : max_error_px) limits.push_back(limit_px);
+  return limits.empty() ? final_px : Median(std::move(limits));
+}
+
+void RoundLimits::Tighten(const std::map<ImageId, double>& median_px) {
+  for (const auto& [id, image_median_px] : median_px) {
+    double& limit_px = max_error_px.at(id);
+    limit_px = std::min(limit_px, std::max(kMaxMedians * image_median_px, final_px));
+  }
 }
 
 RoundOutcome RunRefineRound(const RefineModelOptions& options,
@@ -56,12 +81,15 @@ RoundOutcome RunRefineRound(const RefineModelOptions& options,
                             Reconstruction& model) {
   RoundOutcome outcome;
   RoundLimits current = limits;
-  TriangulateTracks({limits.max_error_px, options.min_angle_deg, options.num_threads},
-                    WithoutImages(tracks, held),
-                    model);
+  // The share that is held out supports a view no less.
+  const auto min_num_observations =
+      static_cast<size_t>(options.min_num_observations * (1.0 - options.held_out_percent / 100.0));
+  TriangulateTracks(
+      {options.max_error_px, options.min_angle_deg, options.num_threads, limits.max_error_px},
+      WithoutImages(tracks, held),
+      model);
   for (int pass = 0; pass < 2; ++pass) {
-    DropWeakImages(options.min_num_observations, model);
-    outcome.num_supporting = NumSupportingObservations(model);
+    DropWeakImages(min_num_observations, model);
     const bool is_fine = limits.IsFinal() && pass == 1;
     BundleAdjustmentOptions adjustment;
     adjustment.loss_scale_px = std::max(1.0, ComputeReprojectionStats(model).median_px);
@@ -73,15 +101,13 @@ RoundOutcome RunRefineRound(const RefineModelOptions& options,
     adjustment.num_threads = options.num_threads;
     outcome.adjustment = AdjustBundle(adjustment, model);
     if (!outcome.adjustment.success) return {};
-    outcome.median_px = ComputeReprojectionStats(model).median_px;
+    outcome.median_px = MedianErrorsPx(model);
     current.Tighten(outcome.median_px);
-    FilterObservations({current.max_error_px, options.min_angle_deg}, model);
+    FilterObservations({options.max_error_px, options.min_angle_deg, current.max_error_px}, model);
   }
-  DropWeakImages(options.min_num_observations, model);
-  outcome.num_supporting = NumSupportingObservations(model);
-  for (const auto& [id, num] : outcome.num_supporting) {
-    if (num > 0) outcome.adjusted.insert(id);
-  }
+  DropWeakImages(min_num_observations, model);
+  outcome.median_px = MedianErrorsPx(model);
+  for (const auto& [id, median_px] : outcome.median_px) outcome.adjusted.insert(id);
   return outcome;
 }
 

@@ -10,21 +10,23 @@
 
 namespace vgtw {
 
-// Limits of one round; they only become tighter.
+// How far off observations may reproject, per image: some views of a seed are farther off than
+// others. Limits only become tighter.
 struct RoundLimits {
-  double max_error_px = 0.0;
-  double final_px = 0.0;  // max_error_px ends here
+  std::map<ImageId, double> max_error_px;
+  double final_px = 0.0;  // where they end
 
-  bool IsFinal() const { return max_error_px <= final_px; }
-  // After a round whose observations have this median error.
-  void Tighten(double median_px);
+  double MedianPx() const;
+  bool IsFinal() const { return MedianPx() <= final_px; }
+  // After an adjustment that left these median errors.
+  void Tighten(const std::map<ImageId, double>& median_px);
+  bool operator==(const RoundLimits&) const = default;
 };
 
 struct RoundOutcome {
-  std::set<ImageId> adjusted;  // images that took part; empty = nothing was changed
-  std::map<ImageId, size_t> num_supporting;
-  double median_px = 0.0;
-  BundleAdjustmentSummary adjustment;  // the last one
+  std::set<ImageId> adjusted;           // images that took part; empty = nothing was changed
+  std::map<ImageId, double> median_px;  // of their observations
+  BundleAdjustmentSummary adjustment;   // the last one
 };
 
 // Triangulates the tracks, adjusts and drops what does not fit, twice: the first pass finds the

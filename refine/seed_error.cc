@@ -41,13 +41,17 @@ SeedError MeasureSeedError(const Reconstruction& model,
   }
   SeedError error;
   error.max_px = PixelsOfAngle(model, kWorstErrorDeg);
+  for (const auto& [id, image] : model.images) error.max_px_by_image[id] = error.max_px;
   if (longest.empty()) return error;
   const double worst_px = error.max_px;
   for (int i = 0; i < kNumPasses; ++i) {
-    const double scale_px = error.max_px / kMaxMedians;
-    const HeldOutJudge judge(longest, scale_px, 2.0 * worst_px, num_threads);
-    error.median_px = Median(judge.Measure(model));
-    error.max_px = std::min(std::max(kMaxMedians * error.median_px, 1.0), worst_px);
+    const HeldOutJudge judge(longest, error.max_px / kMaxMedians, 2.0 * worst_px, num_threads);
+    const HeldOutJudge::Errors errors = judge.Measure(model);
+    error.median_px = Median(errors);
+    error.max_px = std::clamp(kMaxMedians * error.median_px, 1.0, worst_px);
+    for (const auto& [id, median_px] : judge.MedianPxByImage(errors)) {
+      error.max_px_by_image[id] = std::clamp(kMaxMedians * median_px, error.max_px, worst_px);
+    }
   }
   return error;
 }

@@ -4,19 +4,21 @@
 #include "refine/triangulation.h"
 #include "scene/reconstruction.h"
 
+#include <map>
 #include <vector>
 
 namespace vgtw {
 
+// Limits (pixels) below which right observations reproject under the poses and intrinsics of a
+// seed, whose errors are measured by tracks: wide first, then at the scale of what was found.
 struct SeedError {
   double median_px = 0.0;  // of observations from the points that fit their tracks best
-  // Limit below which right observations reproject under these poses.
-  double max_px = 0.0;
+  double max_px = 0.0;     // of the views together
+  std::map<ImageId, double> max_px_by_image;  // of each, at least max_px: views may be far off
 };
 
-// The error that poses and intrinsics make, measured by tracks: wide first, then at the scale of
-// what was found. At most some thousand tracks are looked at, long ones first, because of two rays
-// only the part across the epipolar line can be seen.
+// At most some thousand tracks are looked at, long ones first, because of two rays only the part
+// across the epipolar line can be seen.
 SeedError MeasureSeedError(const Reconstruction& model,
                            const std::vector<Track>& tracks,
                            int num_threads);

@@ -14,7 +14,7 @@
 namespace vgtw {
 namespace {
 
-// The robust estimate begins to doubt an observation at this share of the limit.
+// The robust estimate begins to doubt an observation at this share of its limit.
 constexpr double kScaleShare = 0.5;
 
 struct TrackRay {
@@ -30,15 +30,20 @@ const Image& FindImage(const Reconstruction& model, const TrackElement& element)
   return found->second;
 }
 
-std::vector<TrackRay> RaysOf(const Reconstruction& model, const Track& track) {
+// Rays whose errors are 1 at their limits.
+std::vector<TrackRay> RaysOf(const TriangulationOptions& options,
+                             const Reconstruction& model,
+                             const Track& track) {
   std::vector<TrackRay> rays;
   rays.reserve(track.size());
   for (const TrackElement& element : track) {
     const Image& image = FindImage(model, element);
-    const auto ray = MakePixelRay(model.cameras.at(image.camera_id),
-                                  image.cam_from_world,
-                                  image.points2D[element.point2D_idx].xy);
-    if (ray) rays.push_back({element, *ray});
+    auto ray = MakePixelRay(model.cameras.at(image.camera_id),
+                            image.cam_from_world,
+                            image.points2D[element.point2D_idx].xy);
+    if (!ray) continue;
+    ray->pixel_from_x /= options.MaxErrorPx(element.image_id);
+    rays.push_back({element, *ray});
   }
   return rays;
 }
@@ -64,14 +69,12 @@ std::vector<const PixelRay*> Pointers(const std::vector<TrackRay>& rays) {
 }
 
 // Moves what the point explains, the best keypoint of each image, out of `rays`.
-std::vector<TrackRay> TakeInliers(const Eigen::Vector3d& xyz,
-                                  double max_error_px,
-                                  std::vector<TrackRay>& rays) {
+std::vector<TrackRay> TakeInliers(const Eigen::Vector3d& xyz, std::vector<TrackRay>& rays) {
   std::vector<TrackRay> inliers;
   std::vector<TrackRay> rest;
   for (const TrackRay& ray : rays) {
-    const double error_px = ErrorPx(ray.ray, xyz);
-    if (error_px > max_error_px) {
+    const double error = ErrorPx(ray.ray, xyz);
+    if (error > 1.0) {
       rest.push_back(ray);
       continue;
     }
@@ -80,7 +83,7 @@ std::vector<TrackRay> TakeInliers(const Eigen::Vector3d& xyz,
     });
     if (twin == inliers.end()) {
       inliers.push_back(ray);
-    } else if (error_px < ErrorPx(twin->ray, xyz)) {
+    } else if (error < ErrorPx(twin->ray, xyz)) {
       rest.push_back(std::exchange(*twin, ray));
     } else {
       rest.push_back(ray);
@@ -94,14 +97,14 @@ std::vector<Point3D> TriangulateTrack(const TriangulationOptions& options,
                                       const Reconstruction& model,
                                       const Track& track) {
   std::vector<Point3D> points;
-  std::vector<TrackRay> rays = RaysOf(model, track);
+  std::vector<TrackRay> rays = RaysOf(options, model, track);
   const Point3D* old = FindOldPoint(model, rays);
   std::optional<Eigen::Vector3d> start;
   if (old) start = old->xyz;
   while (rays.size() >= 2) {
-    const auto xyz = EstimateRayPoint(Pointers(rays), kScaleShare * options.max_error_px, start);
+    const auto xyz = EstimateRayPoint(Pointers(rays), kScaleShare, start);
     if (!xyz) break;
-    const std::vector<TrackRay> inliers = TakeInliers(*xyz, options.max_error_px, rays);
+    const std::vector<TrackRay> inliers = TakeInliers(*xyz, rays);
     if (inliers.size() < 2) break;
     start.reset();
     if (TriangulationAngleDeg(Pointers(inliers), *xyz, options.min_angle_deg) <
@@ -140,10 +143,19 @@ void ReplacePoints(std::vector<std::vector<Point3D>> points_by_track, Reconstruc
 
 }  // namespace
 
+double TriangulationOptions::MaxErrorPx(ImageId image_id) const {
+  const auto found = max_error_px_by_image.find(image_id);
+  return found == max_error_px_by_image.end() ? max_error_px : found->second;
+}
+
 void TriangulationOptions::Check() const {
-  VGTW_CHECK(
-      max_error_px > 0.0,
-      "TriangulationOptions::max_error_px = " + std::to_string(max_error_px) + ", must be > 0");
+  const auto check_limit = [](double limit_px) {
+    VGTW_CHECK(
+        limit_px > 0.0,
+        "TriangulationOptions::max_error_px = " + std::to_string(limit_px) + ", must be > 0");
+  };
+  check_limit(max_error_px);
+  for (const auto& [image_id, limit_px] : max_error_px_by_image) check_limit(limit_px);
   VGTW_CHECK(min_angle_deg >= 0.0 && min_angle_deg < 90.0,
              "TriangulationOptions::min_angle_deg = " + std::to_string(min_angle_deg) +
                  ", must be in [0, 90)");
