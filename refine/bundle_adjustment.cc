@@ -5,7 +5,6 @@
 #include "scene/error.h"
 #include "scene/reprojection.h"
 
-#include <algorithm>
 #include <chrono>
 #include <string>
 
@@ -21,6 +20,9 @@ void BundleAdjustmentOptions::Check() const {
   VGTW_CHECK(function_tolerance >= 0.0 && function_tolerance < 1.0,
              "BundleAdjustmentOptions::function_tolerance = " + std::to_string(function_tolerance) +
                  ", must be in [0, 1)");
+  VGTW_CHECK(
+      max_seconds >= 0.0,
+      "BundleAdjustmentOptions::max_seconds = " + std::to_string(max_seconds) + ", must be >= 0");
   priors.Check();
 }
 
@@ -38,18 +40,17 @@ BundleAdjustmentSummary AdjustBundle(const BundleAdjustmentOptions& options,
     return summary;
   }
   BundleProblem problem(options, reconstruction, participants);
-  const ceres::Solver::Summary solved = problem.Solve();
+  const LevenbergMarquardtSummary solved = problem.Solve();
   summary.message = solved.message;
   summary.num_residuals = static_cast<size_t>(problem.num_residuals());
   summary.initial_cost = solved.initial_cost;
   summary.final_cost = solved.final_cost;
-  summary.num_iterations = std::max(0, static_cast<int>(solved.iterations.size()) - 1);
-  summary.evaluation_sec =
-      solved.residual_evaluation_time_in_seconds + solved.jacobian_evaluation_time_in_seconds;
-  summary.linear_solver_sec = solved.linear_solver_time_in_seconds;
+  summary.num_iterations = solved.num_iterations;
+  summary.evaluation_sec = solved.evaluation_sec;
+  summary.linear_solver_sec = solved.linear_solver_sec;
   summary.gauge = problem.gauge().description;
   summary.priors = problem.SummarizePriors();
-  if (!solved.IsSolutionUsable() || !(solved.final_cost <= solved.initial_cost)) return summary;
+  if (!solved.is_usable) return summary;
 
   if (!problem.IsPossible()) {
     summary.message = "the solution is not a possible reconstruction (" + solved.message + ")";

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <set>
 #include <string>
 
@@ -26,6 +27,8 @@ struct BundleAdjustmentOptions {
   int max_num_iterations = 50;
   // Done when an iteration lowers the cost by less than this share; in [0, 1).
   double function_tolerance = 1e-9;
+  // No iteration begins later; what was reached until then is kept.
+  double max_seconds = std::numeric_limits<double>::infinity();
   int num_threads = 0;  // 0 = all cores
   // Called with (iteration, cost) at the start and after each iteration; returning false stops and
   // keeps the best.

@@ -6,13 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numeric>
 #include <utility>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <glog/logging.h>
 
 namespace vgtw {
 namespace {
@@ -22,8 +20,6 @@ using PoseBlock = std::array<double, kNumPoseParams>;
 
 // Fewer do not determine the 6 degrees of freedom of a pose.
 constexpr size_t kMinPoseObservations = 3;
-// Up to here factorising the dense reduced camera matrix is the quicker way.
-constexpr size_t kMaxDenseImages = 100;
 
 bool HasTwoImages(const std::vector<Observation>& observations) {
   return std::any_of(observations.begin(), observations.end(), [&](const Observation& other) {
@@ -136,38 +132,11 @@ std::unique_ptr<ceres::LossFunction> MakeLoss(const BundleAdjustmentOptions& opt
   return std::make_unique<ceres::TrivialLoss>();
 }
 
-// Calls the caller's function and stops the solver, keeping the best, where it says so.
-class IterationCallback : public ceres::IterationCallback {
- public:
-  explicit IterationCallback(const std::function<bool(int, double)>& function)
-      : function_(function) {}
-
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
-    return function_(summary.iteration, summary.cost) ? ceres::SOLVER_CONTINUE
-                                                      : ceres::SOLVER_TERMINATE_SUCCESSFULLY;
-  }
-
- private:
-  const std::function<bool(int, double)>& function_;
-};
-
 ceres::Problem::Options WithoutLossOwnership() {
   ceres::Problem::Options options;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   return options;
 }
-
-// Ceres also tells glog, which writes to stderr, of every failed step; its summary says enough.
-class QuietLog {
- public:
-  QuietLog() { FLAGS_minloglevel = google::FATAL; }
-  ~QuietLog() { FLAGS_minloglevel = saved_level_; }
-  QuietLog(const QuietLog&) = delete;
-  QuietLog& operator=(const QuietLog&) = delete;
-
- private:
-  const int saved_level_ = FLAGS_minloglevel;
-};
 
 }  // namespace
 
@@ -310,35 +279,15 @@ void BundleProblem::HoldIntrinsics() {
   }
 }
 
-std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::PointsFirst() {
-  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  for (Eigen::Vector3d& point : points_) ordering->AddElementToGroup(point.data(), 0);
-  std::vector<double*> blocks;
-  problem_.GetParameterBlocks(&blocks);
-  for (double* block : blocks) {
-    if (!ordering->IsMember(block)) ordering->AddElementToGroup(block, 1);
-  }
-  return ordering;
-}
-
-ceres::Solver::Summary BundleProblem::Solve() {
-  const QuietLog quiet;
-  ceres::Solver::Options options;
-  options.linear_solver_type =
-      participants_.image_ids.size() <= kMaxDenseImages ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
-  options.linear_solver_ordering = PointsFirst();
+LevenbergMarquardtSummary BundleProblem::Solve() {
+  LevenbergMarquardtOptions options;
   options.num_threads = ResolveThreads(options_.num_threads);
   options.max_num_iterations = options_.max_num_iterations;
+  options.max_seconds = options_.max_seconds;
   // Slow valleys (focal length against depth) lose little cost per step on noisy data.
   options.function_tolerance = options_.function_tolerance;
-  options.parameter_tolerance = 1e-10;
-  options.max_num_consecutive_invalid_steps = 20;  // a point met a camera's plane
-  options.logging_type = ceres::SILENT;
-  IterationCallback callback(options_.on_iteration);
-  if (options_.on_iteration) options.callbacks.push_back(&callback);
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem_, &summary);
-  return summary;
+  options.on_iteration = options_.on_iteration;
+  return Minimise(options, problem_, points_);
 }
 
 bool BundleProblem::IsPossible() const {

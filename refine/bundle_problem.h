@@ -3,6 +3,7 @@
 
 #include "refine/bundle_adjustment.h"
 #include "refine/gauge.h"
+#include "refine/levenberg_marquardt.h"
 #include "refine/prior_blocks.h"
 #include "refine/reprojection_cost.h"
 #include "scene/sim3d.h"
@@ -54,7 +55,7 @@ class BundleProblem {
   const std::map<CameraId, std::vector<double>>& params() const { return params_; }
   BundlePriorsSummary SummarizePriors() const { return priors_->Summarize(); }
 
-  ceres::Solver::Summary Solve();
+  LevenbergMarquardtSummary Solve();
 
   // Whether every parameter is finite and every camera usable.
   bool IsPossible() const;
@@ -69,7 +70,6 @@ class BundleProblem {
   void AddPriors();
   void HoldPoses();
   void HoldIntrinsics();
-  std::shared_ptr<ceres::ParameterBlockOrdering> PointsFirst();
 
   const BundleAdjustmentOptions& options_;
   const Reconstruction& reconstruction_;
