@@ -59,7 +59,8 @@ struct ViewReport {
   size_t num_observations = 0;       // in the refined model
   size_t num_supporting = 0;         // of these, of points that three views see
   double rotation_change_deg = 0.0;  // refined against feed-forward, relative to the others
-  std::string outcome;               // Name(ViewOutcome): refined, or why not
+  std::string outcome;               // Name(ViewOutcome)
+  std::string reason;                // why it is not refined; "" if it is
 };
 
 struct PipelineReport {

@@ -47,7 +47,9 @@ std::vector<ViewReport> ReportViews(const json& stages,
     view.num_observations = NumObservations(image);
     view.rotation_change_deg = change_deg_by_name[image.name];
     view.num_supporting = supporting.at(id);
-    view.outcome = stages.at("refine").at("result").at("views").at(image.name).at("outcome");
+    const json& refinement = stages.at("refine").at("result").at("views").at(image.name);
+    view.outcome = refinement.at("outcome");
+    view.reason = refinement.at("reason");
     views.push_back(view);
   }
   std::sort(views.begin(), views.end(), [](const ViewReport& a, const ViewReport& b) {
@@ -147,7 +149,8 @@ json AsJson(const PipelineReport& report) {
                      {"num_observations", view.num_observations},
                      {"num_supporting_observations", view.num_supporting},
                      {"rotation_change_deg", view.rotation_change_deg},
-                     {"status", view.outcome}});
+                     {"status", view.outcome},
+                     {"reason", view.reason}});
   }
   json object = {{"views", views},
                  {"feedforward", AsJson(report.feedforward)},

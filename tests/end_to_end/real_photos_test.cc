@@ -3,6 +3,7 @@
 #include "bridge/mask_apply.h"
 #include "bridge/predictions.h"
 #include "scene/perturb.h"
+#include "scene/statistics.h"
 #include "tests/end_to_end/run_vgtw.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/temporary_folder.h"
@@ -43,6 +44,12 @@ nlohmann::json RunOn(const fs::path& photos,
   if (run.exit_code != 0) return {};
   std::cout << run.output;
   return ReadJson(json_path);
+}
+
+double MedianCentre(const nlohmann::json& error) {
+  std::vector<double> centres;
+  for (const nlohmann::json& view : error["views"]) centres.push_back(view["centre"]);
+  return Median(centres);
 }
 
 void ExpectColmapReads(const fs::path& model, size_t num_images) {
@@ -100,10 +107,12 @@ TEST(RealPhotos, RoomWithoutOverlapEndsHonestly) {
     EXPECT_LT(view["rotation_change_deg"].get<double>(), 10.0) << view;
     if (view["status"] == "refined") continue;
     ++num_kept;
-    const std::string name = view["name"];
-    EXPECT_THAT(report["notes"].dump(), HasSubstr(name + " keeps its feed-forward pose"));
+    EXPECT_THAT(view["reason"].get<std::string>(),
+                HasSubstr("observations of points that three photos see"));
+    EXPECT_EQ(view["rotation_change_deg"], 0.0) << view;
   }
   EXPECT_GT(num_kept, 0u);
+  EXPECT_THAT(report["notes"].dump(), HasSubstr("keep their poses: "));
   ExpectColmapReads(folder / "out/sparse/refined", 8);
 }
 
@@ -136,11 +145,12 @@ TEST(RealPhotos, CornerIsReconstructedFromPerturbedPosesAndMasks) {
     total_excluded_share += view["excluded_share"].get<double>();
   }
   EXPECT_GT(total_excluded_share, 0.1);
-  for (const char* error : {"centre_rmse_percent", "relative_direction_median_deg"}) {
-    EXPECT_LT(report["refined_error"][error].get<double>(),
-              report["feedforward_error"][error].get<double>())
-        << error;
-  }
+  // Medians, for the reference of view_008 is farther off than the predictions.
+  const nlohmann::json& before = report["feedforward_error"];
+  const nlohmann::json& after = report["refined_error"];
+  EXPECT_LT(MedianCentre(after), 0.7 * MedianCentre(before));
+  EXPECT_LT(after["relative_direction_median_deg"].get<double>(),
+            0.7 * before["relative_direction_median_deg"].get<double>());
   ExpectColmapReads(folder / "out/sparse/refined", truth.views.size());
 }
 
