@@ -49,7 +49,7 @@ BundleAdjustmentSummary AdjustBundle(const BundleAdjustmentOptions& options,
   summary.evaluation_sec = solved.evaluation_sec;
   summary.linear_solver_sec = solved.linear_solver_sec;
   summary.gauge = problem.gauge().description;
-  summary.priors = problem.SummarizePriors();
+  summary.priors = problem.priors().Summarize();
   if (!solved.is_usable) return summary;
 
   if (!problem.IsPossible()) {

@@ -88,17 +88,21 @@ void MeasuredSigmaOptions::Check() const {
   VGTW_CHECK(num_stated_residuals >= 0.0,
              "MeasuredSigmaOptions::num_stated_residuals = " +
                  std::to_string(num_stated_residuals) + ", must be >= 0");
+  VGTW_CHECK(
+      redundancy >= 0.0 && redundancy <= 1.0,
+      "MeasuredSigmaOptions::redundancy = " + std::to_string(redundancy) + ", must be in [0, 1]");
 }
 
 double MeasuredSigmaFactor(const std::vector<double>& residuals,
                            const MeasuredSigmaOptions& options) {
   options.Check();
-  if (residuals.empty()) return 1.0;
+  const double n = options.redundancy * static_cast<double>(residuals.size());
+  if (!(n > 0.0)) return 1.0;
   std::vector<double> sizes;
   for (const double residual : residuals) sizes.push_back(std::abs(residual));
   // 1.4826: the sigma of a Gaussian by the median of its absolute values.
-  const double measured = std::max(options.min_factor, 1.4826 * Median(std::move(sizes)));
-  const auto n = static_cast<double>(residuals.size());
+  const double measured = std::max(
+      options.min_factor, 1.4826 * Median(std::move(sizes)) / std::sqrt(options.redundancy));
   const double n0 = options.num_stated_residuals;
   return std::sqrt((n * measured * measured + n0) / (n + n0));
 }

@@ -119,14 +119,19 @@ std::optional<Sim3d> EstimateReferenceFromWorld(const CentrePriors& priors,
                                                 const std::map<ImageId, Rigid3d>& cam_from_world);
 
 struct MeasuredSigmaOptions {
-  double min_factor = 0.1;             // residuals that the priors themselves caused prove no more
-  double num_stated_residuals = 10.0;  // the stated sigma counts like so many measured residuals
+  double min_factor = 0.1;  // > 0
+  // The stated sigma counts like so many measured residuals; >= 0.
+  double num_stated_residuals = 10.0;
+  // Share of their variance that the residuals keep, in [0, 1]: PriorRedundancies of
+  // refine/uncertainty.h. Without it priors that outweigh the pixels seem better than they are.
+  double redundancy = 1.0;
 
   void Check() const;
 };
 
 // By which factor a group's stated sigmas should be multiplied, given its residuals in sigmas:
-//   sqrt((n m^2 + n_0) / (n + n_0)),  m = 1.4826 median |residual|, not below min_factor.
+//   sqrt((r n m^2 + n_0) / (r n + n_0)),  m = 1.4826 median |residual| / sqrt(r) >= min_factor,
+// n their number and r their redundancy. Repeated with the new sigmas it converges in a few rounds.
 double MeasuredSigmaFactor(const std::vector<double>& residuals,
                            const MeasuredSigmaOptions& options = {});
 

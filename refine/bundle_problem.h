@@ -53,7 +53,7 @@ class BundleProblem {
   const std::vector<std::array<double, kNumPoseParams>>& poses() const { return poses_; }
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
   const std::map<CameraId, std::vector<double>>& params() const { return params_; }
-  BundlePriorsSummary SummarizePriors() const { return priors_->Summarize(); }
+  const PriorBlocks& priors() const { return *priors_; }
 
   LevenbergMarquardtSummary Solve();
 

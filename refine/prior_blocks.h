@@ -59,6 +59,12 @@ class PriorBlocks {
   // At the present parameters.
   BundlePriorsSummary Summarize() const;
 
+  using ResidualBlockIds = std::vector<ceres::ResidualBlockId>;
+  const ResidualBlockIds& rotations() const { return rotations_.residual_blocks; }
+  const ResidualBlockIds& pose_centres() const { return pose_centres_.residual_blocks; }
+  const ResidualBlockIds& centres() const { return centres_.residual_blocks; }
+  const ResidualBlockIds& focal_lengths() const { return focal_lengths_.residual_blocks; }
+
  private:
   using SimilarityBlock = std::array<double, kNumSimilarityParams>;
   using ViewBlock = std::array<double, 2>;

@@ -63,20 +63,62 @@ Eigen::Matrix3d PseudoInverse(const Eigen::Matrix3d& information) {
   return solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose();
 }
 
+// Evaluates residual blocks one after the other.
+class Evaluator {
+ public:
+  struct Factor {
+    const ReducedBlock* block = nullptr;  // none for a point
+    RowMajor jacobian;                    // times the root of the weight
+  };
+
+  Evaluator(const ceres::Problem& problem,
+            std::span<const Eigen::Vector3d> points,
+            const std::vector<ReducedBlock>& blocks,
+            const ResidualWeight& weight)
+      : problem_(problem), points_(points), weight_(weight) {
+    for (const ReducedBlock& block : blocks) blocks_[block.values] = &block;
+  }
+
+  // Derivatives by the free blocks and points; empty where there is no value.
+  const std::vector<Factor>& Evaluate(ceres::ResidualBlockId id) {
+    problem_.GetParameterBlocksForResidualBlock(id, &parameters_);
+    const int num_rows = problem_.GetCostFunctionForResidualBlock(id)->num_residuals();
+    factors_.clear();
+    factors_.reserve(parameters_.size());  // the pointers below stay
+    jacobians_.assign(parameters_.size(), nullptr);
+    for (size_t i = 0; i < parameters_.size(); ++i) {
+      const auto block = blocks_.find(parameters_[i]);
+      const bool is_point = PointIdx(points_, parameters_[i]) >= 0;
+      if (block == blocks_.end() && !is_point) continue;
+      const int size = is_point ? 3 : block->second->size;
+      factors_.push_back({is_point ? nullptr : block->second, RowMajor(num_rows, size)});
+      jacobians_[i] = factors_.back().jacobian.data();
+    }
+    double half_squared_norm = 0.0;
+    if (!problem_.EvaluateResidualBlock(
+            id, false, &half_squared_norm, nullptr, jacobians_.data())) {
+      factors_.clear();
+      return factors_;
+    }
+    const double root = std::sqrt(weight_(id, 2.0 * half_squared_norm));
+    for (Factor& factor : factors_) factor.jacobian *= root;
+    return factors_;
+  }
+
+ private:
+  const ceres::Problem& problem_;
+  const std::span<const Eigen::Vector3d> points_;
+  const ResidualWeight& weight_;
+  std::unordered_map<const double*, const ReducedBlock*> blocks_;
+  std::vector<double*> parameters_;
+  std::vector<double*> jacobians_;
+  std::vector<Factor> factors_;
+};
+
 class Reducer {
  public:
-  Reducer(const ceres::Problem& problem,
-          std::span<const Eigen::Vector3d> points,
-          const std::vector<ReducedBlock>& blocks,
-          const ResidualWeight& weight)
-      : problem_(problem), points_(points), weight_(weight) {
-    int size = 0;
-    for (const ReducedBlock& block : blocks) {
-      blocks_[block.values] = &block;
-      size = std::max(size, block.offset + block.size);
-    }
-    matrix_ = Eigen::MatrixXd::Zero(size, size);
-  }
+  Reducer(Evaluator evaluator, int size)
+      : evaluator_(std::move(evaluator)), matrix_(Eigen::MatrixXd::Zero(size, size)) {}
 
   void Add(const std::vector<ceres::ResidualBlockId>& of_one_point) {
     point_information_.setZero();
@@ -98,11 +140,6 @@ class Reducer {
  private:
   // J^T J by a block and the point; of at most as many rows as a camera model has parameters.
   using Coupling = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, 12, 3>;
-  struct Factor {
-    const ReducedBlock* block = nullptr;  // none for a point
-    RowMajor jacobian;
-  };
-
   void Subtract(const Coupling& product, const Coupling& other, int row, int column) {
     if (product.rows() == 6 && other.rows() == 6) {  // of poses: the most, and faster by far
       matrix_.block<6, 6>(row, column).noalias() -=
@@ -113,42 +150,17 @@ class Reducer {
     }
   }
 
-  // Jacobians, multiplied by the root of the weight, by the free blocks of a residual block.
-  bool Evaluate(ceres::ResidualBlockId id) {
-    problem_.GetParameterBlocksForResidualBlock(id, &parameters_);
-    const int num_rows = problem_.GetCostFunctionForResidualBlock(id)->num_residuals();
-    factors_.clear();
-    factors_.reserve(parameters_.size());  // the pointers below stay
-    jacobians_.assign(parameters_.size(), nullptr);
-    for (size_t i = 0; i < parameters_.size(); ++i) {
-      const auto block = blocks_.find(parameters_[i]);
-      const bool is_point = PointIdx(points_, parameters_[i]) >= 0;
-      if (block == blocks_.end() && !is_point) continue;
-      const int size = is_point ? 3 : block->second->size;
-      factors_.push_back({is_point ? nullptr : block->second, RowMajor(num_rows, size)});
-      jacobians_[i] = factors_.back().jacobian.data();
-    }
-    double half_squared_norm = 0.0;
-    if (!problem_.EvaluateResidualBlock(
-            id, false, &half_squared_norm, nullptr, jacobians_.data())) {
-      return false;
-    }
-    const double weight = weight_(id, 2.0 * half_squared_norm);
-    for (Factor& factor : factors_) factor.jacobian *= std::sqrt(weight);
-    return true;
-  }
-
   void AddResidualBlock(ceres::ResidualBlockId id) {
-    if (!Evaluate(id)) return;
+    const std::vector<Evaluator::Factor>& factors = evaluator_.Evaluate(id);
     const RowMajor* point = nullptr;
-    for (const Factor& factor : factors_) {
+    for (const Evaluator::Factor& factor : factors) {
       if (!factor.block) point = &factor.jacobian;
     }
     if (point) point_information_ += point->transpose() * *point;
-    for (const Factor& factor : factors_) {
+    for (const Evaluator::Factor& factor : factors) {
       if (!factor.block) continue;
       const ReducedBlock& block = *factor.block;
-      for (const Factor& other : factors_) {
+      for (const Evaluator::Factor& other : factors) {
         if (!other.block || other.block->offset > block.offset) continue;
         matrix_.block(block.offset, other.block->offset, block.size, other.block->size) +=
             factor.jacobian.transpose() * other.jacobian;
@@ -160,16 +172,10 @@ class Reducer {
     }
   }
 
-  const ceres::Problem& problem_;
-  const std::span<const Eigen::Vector3d> points_;
-  const ResidualWeight& weight_;
-  std::unordered_map<const double*, const ReducedBlock*> blocks_;
+  Evaluator evaluator_;
   Eigen::MatrixXd matrix_;
   Eigen::Matrix3d point_information_;
   std::map<int, Coupling> couplings_;  // by offset of the block
-  std::vector<double*> parameters_;
-  std::vector<double*> jacobians_;
-  std::vector<Factor> factors_;
 };
 
 }  // namespace
@@ -195,41 +201,52 @@ Eigen::MatrixXd ReduceInformation(const ceres::Problem& problem,
                                   std::span<const Eigen::Vector3d> points,
                                   const std::vector<ReducedBlock>& blocks,
                                   const ResidualWeight& weight) {
-  Reducer reducer(problem, points, blocks, weight);
+  const int size = blocks.empty() ? 0 : blocks.back().offset + blocks.back().size;
+  Reducer reducer(Evaluator(problem, points, blocks, weight), size);
   for (const auto& group : GroupByPoint(problem, points)) reducer.Add(group);
   return reducer.matrix();
 }
 
-std::vector<Eigen::MatrixXd> BlockCovariances(const std::vector<ReducedBlock>& blocks,
-                                              const Eigen::MatrixXd& information) {
+InverseInformation::InverseInformation(const Eigen::MatrixXd& information)
+    : units_(information.diagonal().cwiseMax(0.0).cwiseSqrt().cwiseInverse()) {
   // In units in which the diagonal is one, variances are their inflation by the other unknowns.
-  Eigen::VectorXd units = information.diagonal().cwiseMax(0.0).cwiseSqrt().cwiseInverse();
-  for (double& unit : units) {
+  for (double& unit : units_) {
     if (!std::isfinite(unit)) unit = 1.0;
   }
-  Eigen::MatrixXd scaled = units.asDiagonal() * information * units.asDiagonal();
+  Eigen::MatrixXd scaled = units_.asDiagonal() * information * units_.asDiagonal();
   // Beyond rounding, so that undetermined directions come out as large instead of failing.
   scaled.diagonal().array() += 0.01 / kMaxInflation;
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> cholesky(scaled);
-  const bool is_positive = cholesky.info() == Eigen::Success;
-  Eigen::MatrixXd inverse_factor;
-  if (is_positive) {
-    inverse_factor = Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols());
-    cholesky.matrixL().solveInPlace(inverse_factor);
+  if (cholesky.info() != Eigen::Success) return;
+  inverse_factor_ = Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols());
+  cholesky.matrixL().solveInPlace(inverse_factor_);
+}
+
+Eigen::MatrixXd InverseInformation::Covariance(const ReducedBlock& block) const {
+  const Eigen::MatrixXd unknown =
+      Eigen::MatrixXd::Constant(block.size, block.size, std::numeric_limits<double>::quiet_NaN());
+  if (inverse_factor_.size() == 0) return unknown;
+  const auto columns = inverse_factor_.middleCols(block.offset, block.size);
+  const Eigen::MatrixXd inflation = columns.transpose() * columns;
+  if (!(inflation.diagonal().maxCoeff() < kMaxInflation)) return unknown;
+  const auto unit = units_.segment(block.offset, block.size).asDiagonal();
+  return unit * inflation * unit;
+}
+
+double InverseInformation::Leverage(const ceres::Problem& problem,
+                                    ceres::ResidualBlockId id,
+                                    const std::vector<ReducedBlock>& blocks,
+                                    const ResidualWeight& weight) const {
+  Evaluator evaluator(problem, {}, blocks, weight);
+  const int num_rows = problem.GetCostFunctionForResidualBlock(id)->num_residuals();
+  if (inverse_factor_.size() == 0) return num_rows;
+  Eigen::MatrixXd product = Eigen::MatrixXd::Zero(units_.size(), num_rows);
+  for (const Evaluator::Factor& factor : evaluator.Evaluate(id)) {
+    const ReducedBlock& block = *factor.block;
+    product += inverse_factor_.middleCols(block.offset, block.size) *
+               units_.segment(block.offset, block.size).asDiagonal() * factor.jacobian.transpose();
   }
-  std::vector<Eigen::MatrixXd> covariances;
-  for (const ReducedBlock& block : blocks) {
-    Eigen::MatrixXd covariance =
-        Eigen::MatrixXd::Constant(block.size, block.size, std::numeric_limits<double>::quiet_NaN());
-    if (is_positive) {
-      const auto columns = inverse_factor.middleCols(block.offset, block.size);
-      const Eigen::MatrixXd inflation = columns.transpose() * columns;
-      const auto unit = units.segment(block.offset, block.size).asDiagonal();
-      if (inflation.diagonal().maxCoeff() < kMaxInflation) covariance = unit * inflation * unit;
-    }
-    covariances.push_back(std::move(covariance));
-  }
-  return covariances;
+  return std::min<double>(num_rows, product.squaredNorm());
 }
 
 }  // namespace vgtw

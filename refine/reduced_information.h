@@ -32,9 +32,26 @@ Eigen::MatrixXd ReduceInformation(const ceres::Problem& problem,
                                   const std::vector<ReducedBlock>& blocks,
                                   const ResidualWeight& weight);
 
-// The diagonal blocks of the inverse. Blocks whose variance is 1e10 times or more what it would be
-// if all others were known are undetermined: all NaN.
-std::vector<Eigen::MatrixXd> BlockCovariances(const std::vector<ReducedBlock>& blocks,
-                                              const Eigen::MatrixXd& information);
+// The inverse of the information, by what is asked of it.
+class InverseInformation {
+ public:
+  explicit InverseInformation(const Eigen::MatrixXd& information);
+
+  // The diagonal block. All NaN where the variance is 1e10 times or more what it would be if all
+  // other blocks were known: there it is undetermined.
+  Eigen::MatrixXd Covariance(const ReducedBlock& block) const;
+
+  // trace(J S^-1 J^T) of a residual block without point, J its derivative by `blocks`, weighted:
+  // how much of its variance, of num_residuals in all, the adjustment takes away. At most that
+  // number.
+  double Leverage(const ceres::Problem& problem,
+                  ceres::ResidualBlockId id,
+                  const std::vector<ReducedBlock>& blocks,
+                  const ResidualWeight& weight) const;
+
+ private:
+  Eigen::VectorXd units_;
+  Eigen::MatrixXd inverse_factor_;  // L^-1 in these units, empty if there is none
+};
 
 }  // namespace vgtw

@@ -101,16 +101,16 @@ class AmbientCovariances {
  public:
   AmbientCovariances(const ceres::Problem& problem,
                      const std::vector<ReducedBlock>& blocks,
-                     const std::vector<Eigen::MatrixXd>& covariances)
-      : problem_(problem) {
-    for (size_t i = 0; i < blocks.size(); ++i) by_block_[blocks[i].values] = &covariances[i];
+                     const InverseInformation& inverse)
+      : problem_(problem), inverse_(inverse) {
+    for (const ReducedBlock& block : blocks) by_values_[block.values] = &block;
   }
 
   RowMajor Of(const double* block, int size) const {
-    const auto covariance = by_block_.find(block);
-    if (covariance == by_block_.end()) return RowMajor::Zero(size, size);
+    const auto reduced = by_values_.find(block);
+    if (reduced == by_values_.end()) return RowMajor::Zero(size, size);
     const RowMajor derivative = BlockByTangent(problem_, block, size);
-    RowMajor ambient = derivative * *covariance->second * derivative.transpose();
+    RowMajor ambient = derivative * inverse_.Covariance(*reduced->second) * derivative.transpose();
     // A held parameter has none even where the others are unknown.
     for (int i = 0; i < size; ++i) {
       if (!derivative.row(i).isZero()) continue;
@@ -122,7 +122,8 @@ class AmbientCovariances {
 
  private:
   const ceres::Problem& problem_;
-  std::unordered_map<const double*, const Eigen::MatrixXd*> by_block_;
+  const InverseInformation& inverse_;
+  std::unordered_map<const double*, const ReducedBlock*> by_values_;
 };
 
 PoseUncertainty PoseOf(const AmbientCovariances& covariances,
@@ -167,6 +168,27 @@ ResidualWeight MakeWeight(const BundleProblem& problem, double factor, double pr
     if (loss) loss->Evaluate(squared_norm, rho);
     return rho[1] / (loss == &problem.loss() ? factor : prior_variance);
   };
+}
+
+PriorRedundancies FindRedundancies(const BundleProblem& problem,
+                                   const std::vector<ReducedBlock>& blocks,
+                                   const ResidualWeight& weight,
+                                   const InverseInformation& inverse) {
+  const auto redundancy = [&](const PriorBlocks::ResidualBlockIds& ids) {
+    if (ids.empty()) return 1.0;
+    double num_residuals = 0.0;
+    double leverage = 0.0;
+    for (const ceres::ResidualBlockId id : ids) {
+      num_residuals += problem.problem().GetCostFunctionForResidualBlock(id)->num_residuals();
+      leverage += inverse.Leverage(problem.problem(), id, blocks, weight);
+    }
+    return std::max(0.0, 1.0 - leverage / num_residuals);
+  };
+  const PriorBlocks& priors = problem.priors();
+  return {redundancy(priors.rotations()),
+          redundancy(priors.pose_centres()),
+          redundancy(priors.centres()),
+          redundancy(priors.focal_lengths())};
 }
 
 }  // namespace
@@ -215,10 +237,10 @@ Uncertainty EstimateUncertainty(const BundleAdjustmentOptions& bundle_options,
   const double sigma_px = bundle_options.priors.sigma_px;
   const ResidualWeight weight =
       MakeWeight(problem, variance * sums.MeanWeight(), sigma_px * sigma_px);
-  const std::vector<Eigen::MatrixXd> block_covariances =
-      BlockCovariances(blocks, ReduceInformation(ceres_problem, problem.points(), blocks, weight));
-  const AmbientCovariances covariances(ceres_problem, blocks, block_covariances);
-  FillIn(problem, participants, covariances, uncertainty);
+  const InverseInformation inverse(
+      ReduceInformation(ceres_problem, problem.points(), blocks, weight));
+  FillIn(problem, participants, AmbientCovariances(ceres_problem, blocks, inverse), uncertainty);
+  uncertainty.prior_redundancies = FindRedundancies(problem, blocks, weight, inverse);
   uncertainty.success = true;
   return uncertainty;
 }

@@ -29,6 +29,15 @@ struct UncertaintyOptions {
   void Check() const;
 };
 
+// What share of the variance of a group of priors its residuals keep: 1 where the pixels decide, 0
+// where the priors have their way. For MeasuredSigmaFactor; 1 for a group without members.
+struct PriorRedundancies {
+  double rotations = 1.0;
+  double pose_centres = 1.0;
+  double centres = 1.0;
+  double focal_lengths = 1.0;
+};
+
 // Sigmas are NaN where the observations do not determine the quantity.
 struct Uncertainty {
   bool success = false;
@@ -37,6 +46,7 @@ struct Uncertainty {
   double sigma_px = 0.0;  // of a coordinate of an observation, measured by the residuals
   std::map<ImageId, PoseUncertainty> poses;               // of images that took part
   std::map<CameraId, std::vector<double>> camera_sigmas;  // by parameter; 0 where held
+  PriorRedundancies prior_redundancies;
 };
 
 // Standard deviations of the poses and intrinsics that AdjustBundle(bundle_options, reconstruction)

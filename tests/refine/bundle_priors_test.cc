@@ -4,6 +4,7 @@
 #include "evaluation/pose_error.h"
 #include "refine/align.h"
 #include "refine/bundle_adjustment.h"
+#include "refine/uncertainty.h"
 #include "scene/random.h"
 #include "tests/refine/synthetic_priors.h"
 #include "tests/support/synthetic_model.h"
@@ -169,72 +170,6 @@ TEST(BundlePriors, KnownCentresBringAWeakViewNearerToTheTruth) {
   EXPECT_LT(errors.with_priors, 1.15 * std::sqrt(3.0 * (1.0 + 1.0 / 5.0)) * 0.02);
 }
 
-// Root mean square distance of points from the truth.
-double PointError(const Reconstruction& model, const Reconstruction& truth) {
-  double squared = 0.0;
-  for (const auto& [point3D_id, point] : truth.points3D) {
-    squared += (model.points3D.at(point3D_id).xyz - point.xyz).squaredNorm();
-  }
-  return std::sqrt(squared / static_cast<double>(truth.points3D.size()));
-}
-
-// Three cameras on an arc of 2 degrees, 4 away: pixels of sigma 1 know depths to about 4^2 / (500 *
-// 0.14 * sqrt(3)) = 0.13, three priors of 2 % to 0.046.
-TEST(BundlePriors, DepthsPlacePointsOfSmallParallax) {
-  SyntheticModelOptions model_options;
-  model_options.num_images = 3;
-  model_options.arc_deg = 2.0;
-  const Reconstruction truth = MakeSyntheticModel(model_options);
-  Reconstruction without = truth;
-  ProjectAgain(without, 1.0, 20);
-  BundleAdjustmentOptions options;
-  options.refine_poses = false;
-  options.refine_focal_length = false;
-  Reconstruction with_priors = without;
-  ASSERT_TRUE(AdjustBundle(options, without).success);
-  options.priors.depths = DepthPriorsOf(truth, 0.02, 21);
-  const BundleAdjustmentSummary summary = AdjustBundle(options, with_priors);
-  ASSERT_TRUE(summary.success);
-  EXPECT_NEAR(PointError(without, truth), 0.13, 0.02);
-  EXPECT_LT(PointError(with_priors, truth), 0.046);
-  // 360 depths of 2 %: 0.1 %, and the views' own scales and shifts.
-  EXPECT_NEAR(*summary.priors.depth_scale, 0.5, 0.01);
-}
-
-TEST(BundlePriors, DepthsMayHaveAScaleAndAShiftPerView) {
-  const Reconstruction truth = MakeSyntheticModel({});
-  BundleAdjustmentOptions options;
-  options.refine_focal_length = false;
-  options.priors.depths = DepthPriorsOf(truth, 0.0, 0);
-  DepthPriors& depths = options.priors.depths;
-  RandomStream random(22);
-  for (auto& [image_id, priors] : depths.by_image) {
-    const double scale = std::exp(0.2 * random.Normal());
-    const double shift = 0.8 * random.Normal();
-    for (DepthPrior& prior : priors) prior.depth = scale * prior.depth + shift;
-  }
-  depths.view_scale_log_sigma = 10.0;
-  depths.view_shift_sigma = 10.0;
-  Reconstruction adjusted = truth;
-  const BundleAdjustmentSummary summary = AdjustBundle(options, adjusted);
-  ASSERT_TRUE(summary.success);
-  EXPECT_GT(summary.priors.depths.initial_rms, 5.0);
-  // In sigmas of 1 %; the weak priors of scales and shifts pull by 1e-6 of the depths' weight.
-  EXPECT_LT(summary.priors.depths.final_rms, 1e-3);
-  EXPECT_LT(Compare(adjusted, truth).centre_rmse_percent, 1e-3);
-
-  // The switches: neither alone explains both.
-  for (const bool free_scales : {false, true}) {
-    depths.free_view_scales = free_scales;
-    depths.free_view_shifts = !free_scales;
-    Reconstruction either = truth;
-    EXPECT_GT(AdjustBundle(options, either).priors.depths.final_rms, 1.0);
-  }
-  depths.free_view_scales = false;
-  Reconstruction neither = truth;
-  EXPECT_EQ(AdjustBundle(options, neither).num_residuals, 1440u + 720u);
-}
-
 TEST(BundlePriors, ATwentiethOfWildOnesDoesNoHarm) {
   SyntheticModelOptions model_options;
   model_options.num_images = 20;
@@ -385,6 +320,7 @@ TEST(MeasuredSigmaFactor, MeasuresThePriorsOfAnAdjustment) {
   model_options.num_images = 30;
   const Reconstruction truth = MakeSyntheticModel(model_options);
   BundleAdjustmentOptions options;
+  options.refine_focal_length = false;
   options.priors.poses = PosePriorsOf(truth, {0.6, 0.06}, 23);
   double rotations = 1.0 / 3.0;
   double centres = 1.0 / 3.0;
@@ -397,12 +333,17 @@ TEST(MeasuredSigmaFactor, MeasuresThePriorsOfAnAdjustment) {
     ProjectAgain(adjusted, 0.5, 24);
     const BundleAdjustmentSummary summary = AdjustBundle(options, adjusted);
     ASSERT_TRUE(summary.success);
-    rotations *= MeasuredSigmaFactor(summary.priors.rotations.residuals);
-    centres *= MeasuredSigmaFactor(summary.priors.pose_centres.residuals);
+    const PriorRedundancies redundancies =
+        EstimateUncertainty(options, adjusted).prior_redundancies;
+    MeasuredSigmaOptions measured;
+    measured.redundancy = redundancies.rotations;
+    rotations *= MeasuredSigmaFactor(summary.priors.rotations.residuals, measured);
+    measured.redundancy = redundancies.pose_centres;
+    centres *= MeasuredSigmaFactor(summary.priors.pose_centres.residuals, measured);
   }
-  // Of 90 residuals a median has a sigma of 12 %.
-  EXPECT_NEAR(rotations, 1.0, 0.25);
-  EXPECT_NEAR(centres, 1.0, 0.25);
+  // The median of 90 residuals has a sigma of 12 %.
+  EXPECT_NEAR(rotations, 1.0, 0.24);
+  EXPECT_NEAR(centres, 1.0, 0.24);
 }
 
 TEST(EstimateReferenceFromWorld, SurvivesAThirdOfWrongPriors) {
@@ -443,7 +384,12 @@ TEST(MeasuredSigmaFactor, StaysNearTheStatedOneForFew) {
   EXPECT_NEAR(MeasuredSigmaFactor({4.0, -4.0, 4.0}), 2.98087, 1e-4);
   // Perfect agreement of many is no proof of perfect priors: sqrt((990 * 0.01 + 10) / 1000).
   EXPECT_NEAR(MeasuredSigmaFactor(std::vector<double>(990, 0.0)), 0.141067, 1e-6);
+  // Residuals that are a fifth of the errors, and those of priors that have their way.
+  EXPECT_NEAR(
+      MeasuredSigmaFactor(std::vector<double>(1000, 1.0), {0.1, 0.0, 0.04}), 1.4826 / 0.2, 1e-9);
+  EXPECT_EQ(MeasuredSigmaFactor(std::vector<double>(1000, 0.0), {0.1, 10.0, 0.0}), 1.0);
   EXPECT_THROW(MeasuredSigmaFactor({1.0}, {0.0, 10.0}), std::invalid_argument);
+  EXPECT_THROW(MeasuredSigmaFactor({1.0}, {0.1, 10.0, 1.1}), std::invalid_argument);
 }
 
 }  // namespace

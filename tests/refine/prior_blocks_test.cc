@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "refine/prior_blocks.h"
 
+#include "refine/bundle_adjustment.h"
+#include "tests/refine/synthetic_priors.h"
 #include "tests/support/synthetic_model.h"
 
+#include <cmath>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
@@ -77,6 +80,72 @@ TEST(TieComponents, PriorsInTheModelsWorldAnchorWholeComponents) {
   priors.poses = PosePriorsOf(images, {3, 4, 5, 6}).poses;
   const PriorTies ties = TieComponents(priors, images);
   EXPECT_EQ(ties.anchored, (std::set<ImageId>{1, 2, 3, 4, 5, 6, 7, 8}));
+}
+
+// Root mean square distance of points from the truth.
+double PointError(const Reconstruction& model, const Reconstruction& truth) {
+  double squared = 0.0;
+  for (const auto& [point3D_id, point] : truth.points3D) {
+    squared += (model.points3D.at(point3D_id).xyz - point.xyz).squaredNorm();
+  }
+  return std::sqrt(squared / static_cast<double>(truth.points3D.size()));
+}
+
+// Three cameras on an arc of 2 degrees, 4 away: pixels of sigma 1 know depths to about 4^2 / (500 *
+// 0.14 * sqrt(3)) = 0.13, three priors of 2 % to 0.046.
+TEST(PriorBlocks, DepthsPlacePointsOfSmallParallax) {
+  SyntheticModelOptions model_options;
+  model_options.num_images = 3;
+  model_options.arc_deg = 2.0;
+  const Reconstruction truth = MakeSyntheticModel(model_options);
+  Reconstruction without = truth;
+  ProjectAgain(without, 1.0, 20);
+  BundleAdjustmentOptions options;
+  options.refine_poses = false;
+  options.refine_focal_length = false;
+  Reconstruction with_priors = without;
+  ASSERT_TRUE(AdjustBundle(options, without).success);
+  options.priors.depths = DepthPriorsOf(truth, 0.02, 21);
+  const BundleAdjustmentSummary summary = AdjustBundle(options, with_priors);
+  ASSERT_TRUE(summary.success);
+  EXPECT_NEAR(PointError(without, truth), 0.13, 0.02);
+  EXPECT_LT(PointError(with_priors, truth), 0.046);
+  // 360 depths of 2 %: 0.1 %, and the views' own scales and shifts.
+  EXPECT_NEAR(*summary.priors.depth_scale, 0.5, 0.01);
+}
+
+TEST(PriorBlocks, DepthsMayHaveAScaleAndAShiftPerView) {
+  const Reconstruction truth = MakeSyntheticModel({});
+  BundleAdjustmentOptions options;
+  options.refine_focal_length = false;
+  options.priors.depths = DepthPriorsOf(truth, 0.0, 0);
+  DepthPriors& depths = options.priors.depths;
+  RandomStream random(22);
+  for (auto& [image_id, priors] : depths.by_image) {
+    const double scale = std::exp(0.2 * random.Normal());
+    const double shift = 0.8 * random.Normal();
+    for (DepthPrior& prior : priors) prior.depth = scale * prior.depth + shift;
+  }
+  depths.view_scale_log_sigma = 10.0;
+  depths.view_shift_sigma = 10.0;
+  Reconstruction adjusted = truth;
+  const BundleAdjustmentSummary summary = AdjustBundle(options, adjusted);
+  ASSERT_TRUE(summary.success);
+  EXPECT_GT(summary.priors.depths.initial_rms, 5.0);
+  // In sigmas of 1 %; the weak priors of scales and shifts pull by 1e-6 of the depths' weight.
+  EXPECT_LT(summary.priors.depths.final_rms, 1e-3);
+  EXPECT_LT(PointError(adjusted, truth), 1e-4);
+
+  // The switches: neither alone explains both.
+  for (const bool free_scales : {false, true}) {
+    depths.free_view_scales = free_scales;
+    depths.free_view_shifts = !free_scales;
+    Reconstruction either = truth;
+    EXPECT_GT(AdjustBundle(options, either).priors.depths.final_rms, 1.0);
+  }
+  depths.free_view_scales = false;
+  Reconstruction neither = truth;
+  EXPECT_EQ(AdjustBundle(options, neither).num_residuals, 1440u + 720u);
 }
 
 TEST(PriorBlocks, ADepthOfNoObservationIsRefused) {

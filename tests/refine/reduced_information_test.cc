@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <ceres/covariance.h>
+#include <ceres/normal_prior.h>
 #include <gtest/gtest.h>
 
 namespace vgtw {
@@ -47,8 +48,8 @@ TEST_P(ReducedInformation, GivesTheCovariancesOfCeres) {
   SmallProblem small(GetParam());
   const ceres::Problem& problem = small.problem->problem();
   const std::vector<ReducedBlock> blocks = FindReducedBlocks(problem, small.problem->points());
-  const std::vector<Eigen::MatrixXd> covariances = BlockCovariances(
-      blocks, ReduceInformation(problem, small.problem->points(), blocks, UnitWeight));
+  const InverseInformation inverse(
+      ReduceInformation(problem, small.problem->points(), blocks, UnitWeight));
 
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::DENSE_SVD;
@@ -67,22 +68,45 @@ TEST_P(ReducedInformation, GivesTheCovariancesOfCeres) {
     ASSERT_TRUE(expected.GetCovarianceBlockInTangentSpace(
         blocks[i].values, blocks[i].values, block.data()));
     // The inverse of a matrix of condition 1e8 from products is right to about 1e-8.
-    EXPECT_LE((covariances[i] - block).norm(), 1e-6 * block.norm()) << i;
+    EXPECT_LE((inverse.Covariance(blocks[i]) - block).norm(), 1e-6 * block.norm()) << i;
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Problems, ReducedInformation, testing::Bool());
 
-TEST(BlockCovariances, AreNaNWhereNothingIsKnown) {
+TEST(InverseInformation, LeverageIsTheShareThatAnAdjustmentTakes) {
+  double x[3] = {0.0, 0.0, 0.0};
+  ceres::Problem problem;
+  std::vector<ceres::ResidualBlockId> ids;
+  for (double& value : x) {
+    ids.push_back(problem.AddResidualBlock(
+        new ceres::NormalPrior(Eigen::MatrixXd::Constant(1, 1, 2.0), Eigen::VectorXd::Ones(1)),
+        nullptr,
+        &value));
+  }
+  ids.push_back(problem.AddResidualBlock(
+      new ceres::NormalPrior(Eigen::MatrixXd::Constant(1, 1, 3.0), Eigen::VectorXd::Ones(1)),
+      nullptr,
+      &x[0]));
+  const std::vector<ReducedBlock> blocks = FindReducedBlocks(problem, {});
+  const ResidualWeight weight = UnitWeight;
+  const InverseInformation inverse(ReduceInformation(problem, {}, blocks, weight));
+  // x[0] has information 4 + 9: the first takes 4/13 of its residual away, the last 9/13.
+  EXPECT_NEAR(inverse.Leverage(problem, ids[0], blocks, weight), 4.0 / 13.0, 1e-9);
+  EXPECT_NEAR(inverse.Leverage(problem, ids[1], blocks, weight), 1.0, 1e-9);
+  EXPECT_NEAR(inverse.Leverage(problem, ids[3], blocks, weight), 9.0 / 13.0, 1e-9);
+}
+
+TEST(InverseInformation, IsNaNWhereNothingIsKnown) {
   // Two blocks of two; the second one's second direction is that of the first one's.
   const std::vector<ReducedBlock> blocks = {{nullptr, 0, 2}, {nullptr, 2, 1}, {nullptr, 3, 1}};
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(4, 4);
   information.diagonal() << 4.0, 1e6, 1e6, 25.0;
   information(2, 1) = -1e6;
-  const std::vector<Eigen::MatrixXd> covariances = BlockCovariances(blocks, information);
-  EXPECT_TRUE(covariances[0].array().isNaN().all());
-  EXPECT_TRUE(covariances[1].array().isNaN().all());
-  EXPECT_NEAR(covariances[2](0, 0), 1.0 / 25.0, 1e-12);
+  const InverseInformation inverse(information);
+  EXPECT_TRUE(inverse.Covariance(blocks[0]).array().isNaN().all());
+  EXPECT_TRUE(inverse.Covariance(blocks[1]).array().isNaN().all());
+  EXPECT_NEAR(inverse.Covariance(blocks[2])(0, 0), 1.0 / 25.0, 1e-12);
 }
 
 }  // namespace
