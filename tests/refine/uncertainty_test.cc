@@ -27,6 +27,7 @@ Vector6 PoseError(const Rigid3d& estimate, const Rigid3d& truth) {
 struct MonteCarlo {
   RobustLoss loss = RobustLoss::kTrivial;
   bool with_centre_priors = false;
+  double outlier_share = 0.0;  // of observations, 10 to 50 px off
 };
 
 class Uncertainties : public testing::TestWithParam<MonteCarlo> {};
@@ -45,6 +46,7 @@ TEST_P(Uncertainties, AreTheScatterOfSolutions) {
   options.loss = GetParam().loss;
   std::mt19937 random(1);
   std::normal_distribution<double> normal(0.0, 0.01);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
 
   std::map<ImageId, double> squared_distances;  // Mahalanobis
   std::map<ImageId, double> squared_degs, stated_squared_degs;
@@ -65,6 +67,13 @@ TEST_P(Uncertainties, AreTheScatterOfSolutions) {
                                                      Eigen::Vector3d::Constant(0.01)};
       }
     }
+    for (auto& [image_id, image] : solution.images) {
+      for (Point2D& point2D : image.points2D) {
+        if (uniform(random) < GetParam().outlier_share) {
+          point2D.xy += Eigen::Vector2d(10.0 + 40.0 * uniform(random), 10.0);
+        }
+      }
+    }
     ASSERT_TRUE(AdjustBundle(options, solution).success);
     const Uncertainty uncertainty = EstimateUncertainty(options, solution);
     ASSERT_TRUE(uncertainty.success) << uncertainty.message;
@@ -83,7 +92,9 @@ TEST_P(Uncertainties, AreTheScatterOfSolutions) {
     EXPECT_EQ(uncertainty.camera_sigmas.at(1)[1], 0.0);
   }
   // sigma / sqrt(2 redundancy): 400 residuals less 144 unknowns, over 100 solutions.
-  EXPECT_NEAR(sum_sigma_px / kNumSolutions, kSigmaPx, 0.01);
+  // Outliers are no observations: by their share the information shrinks, the variance grows.
+  const double sigma_px = kSigmaPx / std::sqrt(1.0 - GetParam().outlier_share);
+  EXPECT_NEAR(sum_sigma_px / kNumSolutions, sigma_px, 0.01);
   const bool has_gauge = !GetParam().with_centre_priors;
   EXPECT_EQ(squared_distances.size(), has_gauge ? 3u : 5u);
   for (const auto& [image_id, sum] : squared_distances) {
@@ -103,6 +114,7 @@ INSTANTIATE_TEST_SUITE_P(Losses,
                          Uncertainties,
                          testing::Values(MonteCarlo{RobustLoss::kTrivial, false},
                                          MonteCarlo{RobustLoss::kCauchy, false},
+                                         MonteCarlo{RobustLoss::kCauchy, false, 0.05},
                                          MonteCarlo{RobustLoss::kTrivial, true}));
 
 Reconstruction NoisyModel() {
