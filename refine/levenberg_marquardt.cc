@@ -20,11 +20,15 @@ constexpr double kMinDecreaseRatio = 1e-3;
 // A decrease of less than this share of the cost is lost in rounding.
 constexpr double kRounding = 1e-15;
 
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
 // Adds the time that it lives to `seconds`.
 class Stopwatch {
  public:
   explicit Stopwatch(double& seconds) : seconds_(seconds) {}
-  ~Stopwatch() { seconds_ += std::chrono::duration<double>(Clock::now() - start_).count(); }
+  ~Stopwatch() { seconds_ += SecondsSince(start_); }
   Stopwatch(const Stopwatch&) = delete;
   Stopwatch& operator=(const Stopwatch&) = delete;
 
@@ -88,13 +92,12 @@ class Minimiser {
   // Whether there is reason for another iteration; the message says what ended them.
   bool ShouldGoOn() {
     if (!summary_.message.empty()) return false;
-    const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
     if (options_.on_iteration &&
         !options_.on_iteration(summary_.num_iterations, summary_.final_cost)) {
       summary_.message = "stopped by the caller";
     } else if (summary_.num_iterations >= options_.max_num_iterations) {
       summary_.message = "maximum number of iterations";
-    } else if (seconds >= options_.max_seconds) {
+    } else if (SecondsSince(start_) >= options_.max_seconds) {
       summary_.message = "maximum time";
     } else if (region_.radius() < kMinRadius) {
       summary_.message = "no step lowers the cost";

@@ -5,12 +5,14 @@
 //       0.5 px of noise; poses, points, focal length and distortion start with errors
 //   bundle_adjustment_benchmark adjust MODEL OUTPUT ITERATIONS [THREADS]
 //       poses, points, f and k of the model with squared residuals; one line of JSON: seconds of
-//       the whole and of its parts, costs (half the sum of squares, px^2), peak memory
+//       the whole and of its parts, costs (half the sum of squares, px^2), peak memory; [seconds
+//       since the start, cost] after each iteration
 #include "bridge/colmap_model.h"
 #include "refine/bundle_adjustment.h"
 #include "scene/memory.h"
 #include "scene/random.h"
 
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -94,11 +96,21 @@ void Adjust(const std::string& input, const std::string& output, int iterations,
   options.max_num_iterations = iterations;
   options.function_tolerance = 0.0;
   options.num_threads = threads;
+  std::string steps;
+  const auto start = std::chrono::steady_clock::now();
+  options.on_iteration = [&](int, double cost) {
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    char step[64];
+    std::snprintf(
+        step, sizeof(step), "%s[%.3f, %.4f]", steps.empty() ? "" : ", ", seconds.count(), cost);
+    steps += step;
+    return true;
+  };
   const BundleAdjustmentSummary summary = AdjustBundle(options, model);
   std::printf(
       "{\"seconds\": %.3f, \"evaluation_seconds\": %.3f, \"linear_seconds\": %.3f, "
       "\"iterations\": %d, \"residuals\": %zu, \"initial_cost\": %.6f, \"final_cost\": %.6f, "
-      "\"f\": %.4f, \"k\": %.6f, \"resident_gib\": %.3f, \"peak_gib\": %.3f}\n",
+      "\"f\": %.4f, \"k\": %.6f, \"resident_gib\": %.3f, \"peak_gib\": %.3f, \"steps\": [%s]}\n",
       summary.total_sec,
       summary.evaluation_sec,
       summary.linear_solver_sec,
@@ -109,7 +121,8 @@ void Adjust(const std::string& input, const std::string& output, int iterations,
       model.cameras.at(1).params[0],
       model.cameras.at(1).params[3],
       static_cast<double>(resident) / kGib,
-      static_cast<double>(PeakMemory()) / kGib);
+      static_cast<double>(PeakMemory()) / kGib,
+      steps.c_str());
   WriteModel(model, output, {.overwrite = true});
 }
 
