@@ -24,6 +24,8 @@ json AsJson(const RefinedView& view) {
           {"num_held_out", view.num_held_out},
           {"held_out_before_px", NumberOrNull(view.held_out_before_px)},
           {"held_out_after_px", NumberOrNull(view.held_out_after_px)},
+          {"sigma_rotation_deg", NumberOrNull(view.sigma_rotation_deg)},
+          {"sigma_centre", NumberOrNull(view.sigma_centre)},
           {"turn_deg", view.turn_deg},
           {"move", view.move}};
 }
@@ -36,6 +38,19 @@ json AsJson(const RefineRound& round) {
           {"is_accepted", round.is_accepted},
           {"put_back", round.put_back},
           {"adjustment", AsJson(round.adjustment)}};
+}
+
+json AsJson(const Uncertainty& uncertainty) {
+  json cameras = json::object();
+  for (const auto& [id, sigmas] : uncertainty.camera_sigmas) {
+    json& camera = cameras[std::to_string(id)] = json::array();
+    for (const double sigma : sigmas) camera.push_back(NumberOrNull(sigma));
+  }
+  return {{"success", uncertainty.success},
+          {"message", uncertainty.message},
+          {"gauge", uncertainty.gauge},
+          {"sigma_px", NumberOrNull(uncertainty.sigma_px)},
+          {"camera_sigmas", cameras}};
 }
 
 // "a.jpg, b.jpg and 7 others"
@@ -93,7 +108,8 @@ json AsJson(const RefineModelResult& result) {
           {"rounds", rounds},
           {"num_held_out_tracks", result.num_held_out_tracks},
           {"held_out_before_px", NumberOrNull(result.held_out_before_px)},
-          {"held_out_after_px", NumberOrNull(result.held_out_after_px)}};
+          {"held_out_after_px", NumberOrNull(result.held_out_after_px)},
+          {"uncertainty", AsJson(result.uncertainty)}};
 }
 
 std::vector<std::string> UnrefinedNotes(const json& views) {
@@ -117,6 +133,7 @@ std::string FormatRefinement(const RefineModelResult& result) {
                                                  "held out px before",
                                                  "after",
                                                  "turned deg",
+                                                 "+- deg",
                                                  "status"}};
   for (const auto& [id, view] : result.views) {
     rows.push_back({view.name,
@@ -125,6 +142,7 @@ std::string FormatRefinement(const RefineModelResult& result) {
                     FormatNumber(view.held_out_before_px, 2),
                     FormatNumber(view.held_out_after_px, 2),
                     FormatNumber(view.turn_deg, 3),
+                    FormatNumber(view.sigma_rotation_deg, 3),
                     std::string(Name(view.outcome))});
   }
   std::string text = FormatTable(rows) + Conclusion(result);

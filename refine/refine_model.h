@@ -3,6 +3,7 @@
 
 #include "refine/bundle_adjustment.h"
 #include "refine/triangulation.h"
+#include "refine/uncertainty.h"
 #include "scene/progress.h"
 #include "scene/reconstruction.h"
 
@@ -31,8 +32,11 @@ struct RefineModelOptions {
   bool refine_focal_length = true;
   bool refine_principal_point = false;
   bool refine_extra_params = true;  // distortion, where the camera's model has it
-  int num_threads = 0;              // 0 = all cores
-  ProgressCallback progress;        // (rounds done, rounds at most)
+  // What is known besides pixels. Stated sigmas are where the measured ones start from: residuals
+  // give them anew after every adjustment.
+  BundlePriors priors;
+  int num_threads = 0;        // 0 = all cores
+  ProgressCallback progress;  // (rounds done, rounds at most)
 
   void Check() const;
 };
@@ -53,6 +57,9 @@ struct RefinedView {
   size_t num_held_out = 0;      // observations that judged it
   double held_out_before_px = std::numeric_limits<double>::quiet_NaN();
   double held_out_after_px = std::numeric_limits<double>::quiet_NaN();
+  // Standard deviations of a refined pose, relative to what Uncertainty::gauge holds; scene units.
+  double sigma_rotation_deg = std::numeric_limits<double>::quiet_NaN();
+  double sigma_centre = std::numeric_limits<double>::quiet_NaN();
   double turn_deg = 0.0;  // from the seed's pose, the whole aligned with the seed
   double move = 0.0;      // of the camera centre, scene units, likewise
 };
@@ -76,6 +83,7 @@ struct RefineModelResult {
   size_t num_held_out_tracks = 0;
   double held_out_before_px = std::numeric_limits<double>::quiet_NaN();
   double held_out_after_px = std::numeric_limits<double>::quiet_NaN();
+  Uncertainty uncertainty;  // of what was refined
 
   bool IsRefined() const;  // whether any view is
 };

@@ -16,6 +16,8 @@ namespace {
 constexpr double kCoarseTolerance = 1e-4;
 constexpr double kFineTolerance = 1e-7;
 constexpr double kMaxMedians = 6.0;
+// Keypoints are not better than that, however few there are.
+constexpr double kMinSigmaPx = 0.1;
 
 std::vector<Track> WithoutImages(const std::vector<Track>& tracks, const std::set<ImageId>& held) {
   if (held.empty()) return tracks;
@@ -59,6 +61,36 @@ std::map<ImageId, double> MedianErrorsPx(const Reconstruction& model) {
   return medians;
 }
 
+bool HasEntries(const BundlePriors& priors) {
+  return !priors.poses.by_image.empty() || !priors.centres.by_image.empty() ||
+         !priors.focal_lengths.empty() || !priors.depths.by_image.empty();
+}
+
+// Gives every group the sigma that its residuals show.
+void ScaleSigmas(const BundlePriorsSummary& summary,
+                 const PriorRedundancies& redundancies,
+                 BundlePriors& priors) {
+  const auto factor_of = [](const PriorGroupSummary& group, double redundancy) {
+    MeasuredSigmaOptions options;
+    options.redundancy = std::clamp(redundancy, 0.0, 1.0);
+    return MeasuredSigmaFactor(group.residuals, options);
+  };
+  const double rotations = factor_of(summary.rotations, redundancies.rotations);
+  const double pose_centres = factor_of(summary.pose_centres, redundancies.pose_centres);
+  const double centres = factor_of(summary.centres, redundancies.centres);
+  const double focal_lengths = factor_of(summary.focal_lengths, redundancies.focal_lengths);
+  const double depths = factor_of(summary.depths, 1.0);
+  for (auto& [id, prior] : priors.poses.by_image) {
+    prior.rotation_sigma_deg *= rotations;
+    prior.centre_sigma *= pose_centres;
+  }
+  for (auto& [id, prior] : priors.centres.by_image) prior.sigma *= centres;
+  for (auto& [id, prior] : priors.focal_lengths) prior.log_sigma *= focal_lengths;
+  for (auto& [id, depths_of_view] : priors.depths.by_image) {
+    for (DepthPrior& prior : depths_of_view) prior.log_sigma *= depths;
+  }
+}
+
 }  // namespace
 
 double RoundLimits::MedianPx() const {
@@ -74,10 +106,27 @@ void RoundLimits::Tighten(const std::map<ImageId, double>& median_px) {
   }
 }
 
+BundleAdjustmentOptions AdjustmentOf(const RefineModelOptions& options,
+                                     const Reconstruction& model,
+                                     const BundlePriors& priors) {
+  BundleAdjustmentOptions adjustment;
+  const double median_px = ComputeReprojectionStats(model).median_px;
+  adjustment.loss_scale_px = std::max(1.0, median_px);
+  adjustment.refine_focal_length = options.refine_focal_length;
+  adjustment.refine_principal_point = options.refine_principal_point;
+  adjustment.refine_extra_params = options.refine_extra_params;
+  adjustment.num_threads = options.num_threads;
+  adjustment.priors = priors;
+  // The median length of a normal error in the plane is 1.18 sigmas of a coordinate.
+  adjustment.priors.sigma_px = std::max(median_px / 1.18, kMinSigmaPx);
+  return adjustment;
+}
+
 RoundOutcome RunRefineRound(const RefineModelOptions& options,
                             const std::vector<Track>& tracks,
                             const std::set<ImageId>& held,
                             const RoundLimits& limits,
+                            BundlePriors& priors,
                             Reconstruction& model) {
   RoundOutcome outcome;
   RoundLimits current = limits;
@@ -91,16 +140,16 @@ RoundOutcome RunRefineRound(const RefineModelOptions& options,
   for (int pass = 0; pass < 2; ++pass) {
     DropWeakImages(min_num_observations, model);
     const bool is_fine = limits.IsFinal() && pass == 1;
-    BundleAdjustmentOptions adjustment;
-    adjustment.loss_scale_px = std::max(1.0, ComputeReprojectionStats(model).median_px);
-    adjustment.refine_focal_length = options.refine_focal_length;
-    adjustment.refine_principal_point = options.refine_principal_point;
+    BundleAdjustmentOptions adjustment = AdjustmentOf(options, model, priors);
     // Distortion is released once poses are near: before that it would soak up their errors.
-    adjustment.refine_extra_params = options.refine_extra_params && (limits.IsFinal() || pass == 1);
+    adjustment.refine_extra_params &= limits.IsFinal() || pass == 1;
     adjustment.function_tolerance = is_fine ? kFineTolerance : kCoarseTolerance;
-    adjustment.num_threads = options.num_threads;
     outcome.adjustment = AdjustBundle(adjustment, model);
     if (!outcome.adjustment.success) return {};
+    if (HasEntries(priors)) {
+      const Uncertainty uncertainty = EstimateUncertainty(adjustment, model);
+      ScaleSigmas(outcome.adjustment.priors, uncertainty.prior_redundancies, priors);
+    }
     outcome.median_px = MedianErrorsPx(model);
     current.Tighten(outcome.median_px);
     FilterObservations({options.max_error_px, options.min_angle_deg, current.max_error_px}, model);

@@ -33,10 +33,17 @@ struct RoundOutcome {
 // poses, the second sharpens them without what the first dropped. Images in `held` and images with
 // too few supporting observations take no part and stay as they are: as fixed cameras their few,
 // often wrong, observations would turn all others around them.
+// The sigmas of `priors` become those that their residuals show.
 RoundOutcome RunRefineRound(const RefineModelOptions& options,
                             const std::vector<Track>& tracks,
                             const std::set<ImageId>& held,
                             const RoundLimits& limits,
+                            BundlePriors& priors,
                             Reconstruction& model);
+
+// How the model is adjusted: robustly at the scale of the error that it has.
+BundleAdjustmentOptions AdjustmentOf(const RefineModelOptions& options,
+                                     const Reconstruction& model,
+                                     const BundlePriors& priors);
 
 }  // namespace vgtw

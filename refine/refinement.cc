@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "refine/refinement.h"
+
+#include "refine/align.h"
+#include "refine/seed_error.h"
+#include "scene/statistics.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+namespace vgtw {
+namespace {
+
+// Scale of the loss of errors held out, pixels.
+constexpr double kLossScalePx = 1.0;
+// Errors held out beyond so many first limits count alike: a wrong match is wrong, however far off.
+constexpr double kLossLimits = 2.0;
+// A difference of the means by so many standard errors is not believed to be chance.
+constexpr double kWorseSigmas = 2.0;
+// Between rounds a view's error may grow by this factor: rounds trade small errors between views.
+constexpr double kMaxGrowth = 1.25;
+// Views turn alike if they turn by less than so many medians.
+constexpr double kMaxMedianTurns = 4.0;
+// So often is a round repeated without views that it left worse.
+constexpr int kMaxRepeats = 3;
+// Mean errors held out that differ by less than this share are alike; the later round, which had
+// tighter limits, is taken.
+constexpr double kTie = 0.002;
+// A round that lowers the mean error held out by less than this share is the last one.
+constexpr double kMinGain = 0.01;
+
+std::string Count(size_t num, const std::string& what) { return std::to_string(num) + " " + what; }
+
+std::string Tenths(double value) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.1f", value);
+  return text;
+}
+
+bool HasMoved(const Rigid3d& before, const Rigid3d& after) {
+  return before.translation != after.translation ||
+         before.rotation.coeffs() != after.rotation.coeffs();
+}
+
+std::vector<double> Values(const std::map<ImageId, double>& by_image) {
+  std::vector<double> values;
+  for (const auto& [id, value] : by_image) values.push_back(value);
+  return values;
+}
+
+}  // namespace
+
+Refinement::Refinement(const RefineModelOptions& options,
+                       const Reconstruction& seed,
+                       const std::vector<Track>& tracks)
+    : options_(options),
+      seed_(seed),
+      tracks_(tracks),
+      split_(HoldOutTracks(tracks, options.held_out_percent, options.seed)),
+      first_limits_(FirstLimits()),
+      judge_(split_.held_out,
+             kLossScalePx,
+             kLossLimits * Percentile(Values(first_limits_.max_error_px), 100.0),
+             options.num_threads),
+      priors_(options.priors),
+      good_(Judge(seed)),
+      seed_errors_(good_.errors),
+      start_px_(good_.mean_px) {}
+
+Judged Refinement::Judge(Reconstruction model) const {
+  HeldOutJudge::Errors errors = judge_.Measure(model);
+  const double mean_px = judge_.MeanPx(errors);
+  return {std::move(model), std::move(errors), mean_px};
+}
+
+std::map<ImageId, double> Refinement::TurnsDeg(const Reconstruction& model) const {
+  std::map<ImageId, double> turns_deg;
+  for (const auto& [id, image] : model.images) {
+    turns_deg[id] =
+        AngleBetweenDeg(seed_.images.at(id).cam_from_world.rotation, image.cam_from_world.rotation);
+  }
+  return turns_deg;
+}
+
+// Why a view's turn is not believed; "" if it is.
+std::string Refinement::FindTurn(const std::map<ImageId, double>& turns_deg,
+                                 ImageId image_id) const {
+  const double limit_deg =
+      std::max(options_.max_turn_deg, kMaxMedianTurns * Median(Values(turns_deg)));
+  const double turn_deg = turns_deg.at(image_id);
+  if (turn_deg <= limit_deg) return "";
+  return "refinement would turn it by " + Tenths(turn_deg) + " deg, at most " + Tenths(limit_deg) +
+         " are believed";
+}
+
+void Refinement::PutBack(const std::set<ImageId>& image_ids, Reconstruction& model) const {
+  for (const ImageId id : image_ids) {
+    model.images.at(id).cam_from_world = good_.model.images.at(id).cam_from_world;
+  }
+  UpdateFrames(model);
+}
+
+// Views of an adjusted model that are worse than before, or not believed.
+std::set<ImageId> Refinement::FindBadViews(const Judged& candidate, const RoundOutcome& outcome) {
+  std::set<ImageId> bad;
+  const std::map<ImageId, double> turns_deg = TurnsDeg(candidate.model);
+  const std::string reason = "refinement would raise the error of its tracks held out";
+  for (const ImageId id : judge_.FindWorse(seed_errors_, candidate.errors, kWorseSigmas)) {
+    if (!outcome.adjusted.contains(id)) continue;
+    bad.insert(id);
+    rejected_[id] = reason;
+  }
+  const auto before_px = judge_.MeanPxByImage(good_.errors);
+  const auto after_px = judge_.MeanPxByImage(candidate.errors);
+  for (const ImageId id : judge_.FindWorse(good_.errors, candidate.errors, kWorseSigmas)) {
+    if (!outcome.adjusted.contains(id) || after_px.at(id) < kMaxGrowth * before_px.at(id)) continue;
+    bad.insert(id);
+    rejected_[id] = reason;
+  }
+  for (const ImageId id : outcome.adjusted) {
+    const std::string turn = FindTurn(turns_deg, id);
+    if (turn.empty()) continue;
+    bad.insert(id);
+    rejected_[id] = turn;
+  }
+  return bad;
+}
+
+std::optional<Judged> Refinement::Attempt(const RoundLimits& limits,
+                                          const std::set<ImageId>& held,
+                                          BundlePriors& priors,
+                                          RoundOutcome& outcome) const {
+  Reconstruction model = good_.model;
+  outcome = RunRefineRound(options_, split_.adjusted, held, limits, priors, model);
+  if (outcome.adjusted.empty()) return std::nullopt;
+  std::set<ImageId> still;
+  for (const auto& [id, image] : model.images) {
+    if (!outcome.adjusted.contains(id)) still.insert(id);
+  }
+  Transform(AlignPoses(model, good_.model, still), model);
+  PutBack(still, model);
+  return Judge(std::move(model));
+}
+
+bool Refinement::RunRound(RoundLimits& limits) {
+  RefineRound round;
+  round.max_error_px = limits.MedianPx();
+  std::set<ImageId> held;
+  RoundOutcome outcome;
+  BundlePriors priors;
+  std::optional<Judged> candidate;
+  for (int i = 0; i <= kMaxRepeats; ++i) {
+    priors = priors_;
+    candidate = Attempt(limits, held, priors, outcome);
+    if (!candidate) break;
+    const std::set<ImageId> bad = FindBadViews(*candidate, outcome);
+    if (bad.empty()) break;
+    held.insert(bad.begin(), bad.end());
+    if (2 * held.size() > outcome.adjusted.size()) {
+      candidate.reset();  // no round that a minority could save
+      break;
+    }
+    if (i < kMaxRepeats) continue;
+    PutBack(held, candidate->model);
+    candidate = Judge(std::move(candidate->model));
+  }
+  for (const ImageId id : held) round.put_back.push_back(seed_.images.at(id).name);
+  if (candidate) {
+    limits.Tighten(outcome.median_px);
+    round.num_points3D = candidate->model.points3D.size();
+    round.median_px = Median(Values(outcome.median_px));
+    round.held_out_px = candidate->mean_px;
+    round.is_accepted =
+        candidate->mean_px <= start_px_ && candidate->mean_px < (1.0 + kTie) * good_.mean_px;
+    round.adjustment = outcome.adjustment;
+    for (const ImageId id : outcome.adjusted) {
+      if (round.is_accepted && !held.contains(id)) rejected_.erase(id);
+    }
+  }
+  rounds_.push_back(round);
+  if (!round.is_accepted) return false;
+  const bool has_gained = candidate->mean_px < (1.0 - kMinGain) * good_.mean_px;
+  good_ = std::move(*candidate);
+  priors_ = std::move(priors);
+  return has_gained;
+}
+
+// Views that moved and yet are not tied down by what reprojects well: their observations are wrong.
+void Refinement::PutBackUnsupported() {
+  for (bool is_done = false; !is_done;) {
+    is_done = true;
+    Reconstruction model = good_.model;
+    for (const auto& [id, num] : NumSupportingObservations(TriangulateAll(model))) {
+      Rigid3d& pose = model.images.at(id).cam_from_world;
+      const Rigid3d& seed_pose = seed_.images.at(id).cam_from_world;
+      if (num >= static_cast<size_t>(options_.min_num_observations) || !HasMoved(seed_pose, pose)) {
+        continue;
+      }
+      pose = seed_pose;
+      rejected_[id] = "its new pose is supported by " + std::to_string(num) +
+                      " observations of points that three photos see, at least " +
+                      std::to_string(options_.min_num_observations) + " are needed";
+      is_done = false;
+    }
+    if (is_done) return;
+    UpdateFrames(model);
+    good_ = Judge(std::move(model));
+  }
+}
+
+RoundLimits Refinement::FirstLimits() const {
+  RoundLimits limits;
+  limits.final_px = options_.max_error_px;
+  const SeedError error = MeasureSeedError(seed_, split_.adjusted, options_.num_threads);
+  for (const auto& [id, max_px] : error.max_px_by_image) {
+    limits.max_error_px[id] = std::max(max_px, limits.final_px);
+  }
+  return limits;
+}
+
+Reconstruction Refinement::TriangulateAll(const Reconstruction& poses,
+                                          const std::map<ImageId, double>& max_error_px) const {
+  Reconstruction model = poses;
+  TriangulateTracks(
+      {options_.max_error_px, options_.min_angle_deg, options_.num_threads, max_error_px},
+      tracks_,
+      model);
+  return model;
+}
+
+RefineModelResult Refinement::Run() {
+  RefineModelResult result;
+  result.num_held_out_tracks = split_.held_out.size();
+  result.held_out_before_px = start_px_;
+  RoundLimits limits = first_limits_;
+  for (int i = 0; i < options_.max_num_rounds; ++i) {
+    const RoundLimits before_round = limits;
+    const bool has_gained = RunRound(limits);
+    if (options_.progress) options_.progress(i + 1, options_.max_num_rounds);
+    // The same again would come of the same limits and poses.
+    if (!has_gained && limits == before_round) break;
+  }
+  PutBackUnsupported();
+  if (good_.mean_px > start_px_) good_ = Judge(seed_);
+  result.feedforward = TriangulateAll(seed_, first_limits_.max_error_px);
+  result.refined = TriangulateAll(good_.model);
+  result.rounds = rounds_;
+  result.held_out_after_px = good_.mean_px;
+  DescribeViews(result);
+  if (result.IsRefined()) AddUncertainty(result);
+  return result;
+}
+
+void Refinement::DescribeViews(RefineModelResult& result) const {
+  const auto supporting = NumSupportingObservations(result.refined);
+  const auto num_held_out = judge_.NumObservations();
+  const auto before = judge_.MeanPxByImage(seed_errors_);
+  const auto after = judge_.MeanPxByImage(good_.errors);
+  for (const auto& [id, image] : result.refined.images) {
+    const Rigid3d& seed_pose = seed_.images.at(id).cam_from_world;
+    RefinedView& view = result.views[id];
+    view.name = image.name;
+    view.num_supporting = supporting.at(id);
+    view.num_observations = static_cast<size_t>(
+        std::count_if(image.points2D.begin(), image.points2D.end(), [](const Point2D& point2D) {
+          return point2D.HasPoint3D();
+        }));
+    if (num_held_out.contains(id)) {
+      view.num_held_out = num_held_out.at(id);
+      view.held_out_before_px = before.at(id);
+      view.held_out_after_px = after.at(id);
+    }
+    view.turn_deg = AngleBetweenDeg(seed_pose.rotation, image.cam_from_world.rotation);
+    view.move = (OriginInSource(seed_pose) - OriginInSource(image.cam_from_world)).norm();
+    const auto rejected = rejected_.find(id);
+    if (HasMoved(seed_pose, image.cam_from_world)) {
+      view.outcome = ViewOutcome::kRefined;
+    } else if (rejected != rejected_.end()) {
+      view.outcome = ViewOutcome::kRejected;
+      view.reason = rejected->second;
+    } else if (view.num_supporting < static_cast<size_t>(options_.min_num_observations)) {
+      view.reason = Count(view.num_supporting, "observations of points that three photos see, ") +
+                    "at least " + std::to_string(options_.min_num_observations) + " are needed";
+    } else {
+      view.reason = "no round lowered the error of tracks held out";
+    }
+  }
+}
+
+void Refinement::AddUncertainty(RefineModelResult& result) const {
+  BundleAdjustmentOptions adjustment = AdjustmentOf(options_, result.refined, priors_);
+  for (const auto& [id, view] : result.views) {
+    if (view.outcome != ViewOutcome::kRefined) adjustment.fixed_images.insert(id);
+  }
+  result.uncertainty = EstimateUncertainty(adjustment, result.refined);
+  for (auto& [id, view] : result.views) {
+    const auto pose = result.uncertainty.poses.find(id);
+    if (view.outcome != ViewOutcome::kRefined || pose == result.uncertainty.poses.end()) continue;
+    view.sigma_rotation_deg = pose->second.rotation_deg;
+    view.sigma_centre = pose->second.centre;
+  }
+}
+
+}  // namespace vgtw

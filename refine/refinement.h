@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "refine/held_out.h"
+#include "refine/refine_model.h"
+#include "refine/refine_round.h"
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace vgtw {
+
+// Poses and intrinsics with the errors of what is held out under them.
+struct Judged {
+  Reconstruction model;
+  HeldOutJudge::Errors errors;
+  double mean_px = 0.0;
+};
+
+// One call of RefineModel (refine/refine_model.h). Keeps references to the arguments.
+class Refinement {
+ public:
+  Refinement(const RefineModelOptions& options,
+             const Reconstruction& seed,
+             const std::vector<Track>& tracks);
+
+  RefineModelResult Run();
+
+ private:
+  Judged Judge(Reconstruction model) const;
+  // Adjusts the last good model without the images in `held`; nullopt if nothing could be adjusted.
+  std::optional<Judged> Attempt(const RoundLimits& limits,
+                                const std::set<ImageId>& held,
+                                BundlePriors& priors,
+                                RoundOutcome& outcome) const;
+  // One round, repeated without the views that it leaves worse. Whether it is worth another one.
+  bool RunRound(RoundLimits& limits);
+  std::set<ImageId> FindBadViews(const Judged& candidate, const RoundOutcome& outcome);
+  std::string FindTurn(const std::map<ImageId, double>& turns_deg, ImageId image_id) const;
+  std::map<ImageId, double> TurnsDeg(const Reconstruction& model) const;
+  void PutBack(const std::set<ImageId>& image_ids, Reconstruction& model) const;
+  void DescribeViews(RefineModelResult& result) const;
+  void AddUncertainty(RefineModelResult& result) const;
+  void PutBackUnsupported();
+  RoundLimits FirstLimits() const;
+  Reconstruction TriangulateAll(const Reconstruction& poses,
+                                const std::map<ImageId, double>& max_error_px = {}) const;
+
+  const RefineModelOptions& options_;
+  const Reconstruction& seed_;
+  const std::vector<Track>& tracks_;
+  const SplitTracks split_;
+  const RoundLimits first_limits_;
+  const HeldOutJudge judge_;
+  BundlePriors priors_;  // with the sigmas that the last good model shows
+  Judged good_;
+  const HeldOutJudge::Errors seed_errors_;
+  const double start_px_;
+  std::map<ImageId, std::string> rejected_;  // and why
+  std::vector<RefineRound> rounds_;
+};
+
+}  // namespace vgtw
