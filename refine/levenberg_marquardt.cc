@@ -91,9 +91,10 @@ class Minimiser {
  private:
   // Whether there is reason for another iteration; the message says what ended them.
   bool ShouldGoOn() {
+    const bool is_stopped = options_.on_iteration &&
+                            !options_.on_iteration(summary_.num_iterations, summary_.final_cost);
     if (!summary_.message.empty()) return false;
-    if (options_.on_iteration &&
-        !options_.on_iteration(summary_.num_iterations, summary_.final_cost)) {
+    if (is_stopped) {
       summary_.message = "stopped by the caller";
     } else if (summary_.num_iterations >= options_.max_num_iterations) {
       summary_.message = "maximum number of iterations";

@@ -47,7 +47,9 @@ TEST(Minimise, TakesTheStepsOfCeres) {
       };
       const LevenbergMarquardtSummary summary = Minimise(options, by_us.problem(), by_us.points);
       EXPECT_TRUE(summary.is_usable);
+      ASSERT_EQ(costs.size(), static_cast<size_t>(summary.num_iterations) + 1);
       EXPECT_EQ(summary.initial_cost, costs.front());
+      EXPECT_EQ(summary.final_cost, costs.back());
       for (size_t i = 0; i < std::min<size_t>({costs.size(), expected.size(), 12}); ++i) {
         // Roundings grow from step to step as far as the problem's condition lets them.
         EXPECT_NEAR(costs[i], expected[i], 1e-7 * expected[i]) << i;
