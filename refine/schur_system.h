@@ -103,7 +103,8 @@ class SchurSystem {
   };
   struct Scratch;
 
-  void AddBlocks(const ceres::Problem& problem);
+  // Its index, or kHeld.
+  int AddBlock(const ceres::Problem& problem, double* values);
   void ReadTerms(const ceres::Problem& problem);
   void AddTerm(Term term, std::span<const Parameter> parameters);
   void AddEndOfTerms();

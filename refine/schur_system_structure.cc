@@ -29,7 +29,6 @@ SchurSystem::SchurSystem(const ceres::Problem& problem,
                          std::span<Eigen::Vector3d> points,
                          int num_threads)
     : num_threads_(num_threads), points_(points) {
-  AddBlocks(problem);
   ReadTerms(problem);
   RankBlocks();
   SortTerms();
@@ -41,28 +40,22 @@ SchurSystem::SchurSystem(const ceres::Problem& problem,
   point_units_.resize(points_.size());
 }
 
-void SchurSystem::AddBlocks(const ceres::Problem& problem) {
-  std::vector<double*> all;
-  problem.GetParameterBlocks(&all);
-  for (double* values : all) {
-    if (IsInside(values, points_)) continue;
-    if (problem.IsParameterBlockConstant(values)) continue;
-    Block block;
-    block.values = values;
-    block.ambient_size = problem.ParameterBlockSize(values);
-    block.size = problem.ParameterBlockTangentSize(values);
-    if (block.size == 0) continue;
-    block.manifold = problem.GetManifold(values);
-    block.plus_jacobian.resize(block.ambient_size, block.size);
-    blocks_.push_back(std::move(block));
-  }
+int SchurSystem::AddBlock(const ceres::Problem& problem, double* values) {
+  const int size = problem.ParameterBlockTangentSize(values);
+  if (problem.IsParameterBlockConstant(values) || size == 0) return kHeld;
+  Block& block = blocks_.emplace_back();
+  block.values = values;
+  block.ambient_size = problem.ParameterBlockSize(values);
+  block.size = size;
+  block.manifold = problem.GetManifold(values);
+  block.plus_jacobian.resize(block.ambient_size, block.size);
+  return static_cast<int>(blocks_.size()) - 1;
 }
 
 void SchurSystem::ReadTerms(const ceres::Problem& problem) {
+  // Blocks come in the order in which residuals name them: Ceres lists them by address, which
+  // differs from run to run.
   std::unordered_map<const double*, int> block_by_values;
-  for (const Block& block : blocks_) {
-    block_by_values.emplace(block.values, static_cast<int>(block_by_values.size()));
-  }
   std::vector<ceres::ResidualBlockId> ids;
   problem.GetResidualBlocks(&ids);
   std::vector<double*> blocks;
@@ -80,8 +73,10 @@ void SchurSystem::ReadTerms(const ceres::Problem& problem) {
         parameter.block = kPoint;
         term.point = static_cast<int>((values - points_.front().data()) / 3);
         term.num_rows = 2;
-      } else if (const auto found = block_by_values.find(values); found != block_by_values.end()) {
-        parameter.block = found->second;
+      } else {
+        const auto [block, is_new] = block_by_values.try_emplace(values, kHeld);
+        if (is_new) block->second = AddBlock(problem, values);
+        parameter.block = block->second;
       }
     }
     VGTW_CHECK(term.num_residuals <= term.num_rows,
