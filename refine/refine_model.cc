@@ -10,7 +10,7 @@
 namespace vgtw {
 namespace {
 
-// The views that can be used.
+// The views and cameras that can be used.
 Reconstruction UsableViews(const Reconstruction& seed) {
   Reconstruction usable = seed;
   for (const auto& [id, image] : seed.images) {
@@ -25,6 +25,7 @@ Reconstruction UsableViews(const Reconstruction& seed) {
     usable.rigs.clear();
     usable.frames.clear();
   }
+  std::erase_if(usable.cameras, [](const auto& entry) { return !FindFault(entry.second).empty(); });
   return usable;
 }
 

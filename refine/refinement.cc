@@ -49,6 +49,32 @@ std::vector<double> Values(const std::map<ImageId, double>& by_image) {
   return values;
 }
 
+double LargestPx(const RoundLimits& limits) {
+  double largest_px = limits.final_px;
+  for (const auto& [id, limit_px] : limits.max_error_px) {
+    largest_px = std::max(largest_px, limit_px);
+  }
+  return largest_px;
+}
+
+// Poses of these images as in `other`, and with them cameras that only such images have.
+void PutBack(const std::set<ImageId>& image_ids,
+             const Reconstruction& other,
+             Reconstruction& model) {
+  std::set<CameraId> cameras_of_others;
+  for (auto& [id, image] : model.images) {
+    if (image_ids.contains(id)) {
+      image.cam_from_world = other.images.at(id).cam_from_world;
+    } else {
+      cameras_of_others.insert(image.camera_id);
+    }
+  }
+  for (auto& [id, camera] : model.cameras) {
+    if (!cameras_of_others.contains(id)) camera = other.cameras.at(id);
+  }
+  UpdateFrames(model);
+}
+
 }  // namespace
 
 Refinement::Refinement(const RefineModelOptions& options,
@@ -61,7 +87,7 @@ Refinement::Refinement(const RefineModelOptions& options,
       first_limits_(FirstLimits()),
       judge_(split_.held_out,
              kLossScalePx,
-             kLossLimits * Percentile(Values(first_limits_.max_error_px), 100.0),
+             kLossLimits * LargestPx(first_limits_),
              options.num_threads),
       priors_(options.priors),
       good_(Judge(seed)),
@@ -92,13 +118,6 @@ std::string Refinement::FindTurn(const std::map<ImageId, double>& turns_deg,
   if (turn_deg <= limit_deg) return "";
   return "refinement would turn it by " + Tenths(turn_deg) + " deg, at most " + Tenths(limit_deg) +
          " are believed";
-}
-
-void Refinement::PutBack(const std::set<ImageId>& image_ids, Reconstruction& model) const {
-  for (const ImageId id : image_ids) {
-    model.images.at(id).cam_from_world = good_.model.images.at(id).cam_from_world;
-  }
-  UpdateFrames(model);
 }
 
 // Views of an adjusted model that are worse than before, or not believed.
@@ -139,7 +158,7 @@ std::optional<Judged> Refinement::Attempt(const RoundLimits& limits,
     if (!outcome.adjusted.contains(id)) still.insert(id);
   }
   Transform(AlignPoses(model, good_.model, still), model);
-  PutBack(still, model);
+  PutBack(still, good_.model, model);
   return Judge(std::move(model));
 }
 
@@ -162,7 +181,7 @@ bool Refinement::RunRound(RoundLimits& limits) {
       break;
     }
     if (i < kMaxRepeats) continue;
-    PutBack(held, candidate->model);
+    PutBack(held, good_.model, candidate->model);
     candidate = Judge(std::move(candidate->model));
   }
   for (const ImageId id : held) round.put_back.push_back(seed_.images.at(id).name);
@@ -191,20 +210,20 @@ void Refinement::PutBackUnsupported() {
   for (bool is_done = false; !is_done;) {
     is_done = true;
     Reconstruction model = good_.model;
+    std::set<ImageId> as_in_seed;
     for (const auto& [id, num] : NumSupportingObservations(TriangulateAll(model))) {
-      Rigid3d& pose = model.images.at(id).cam_from_world;
-      const Rigid3d& seed_pose = seed_.images.at(id).cam_from_world;
-      if (num >= static_cast<size_t>(options_.min_num_observations) || !HasMoved(seed_pose, pose)) {
-        continue;
+      if (!HasMoved(seed_.images.at(id).cam_from_world, model.images.at(id).cam_from_world)) {
+        as_in_seed.insert(id);
+      } else if (num < static_cast<size_t>(options_.min_num_observations)) {
+        as_in_seed.insert(id);
+        rejected_[id] = "its new pose is supported by " + std::to_string(num) +
+                        " observations of points that three photos see, at least " +
+                        std::to_string(options_.min_num_observations) + " are needed";
+        is_done = false;
       }
-      pose = seed_pose;
-      rejected_[id] = "its new pose is supported by " + std::to_string(num) +
-                      " observations of points that three photos see, at least " +
-                      std::to_string(options_.min_num_observations) + " are needed";
-      is_done = false;
     }
     if (is_done) return;
-    UpdateFrames(model);
+    PutBack(as_in_seed, seed_, model);
     good_ = Judge(std::move(model));
   }
 }

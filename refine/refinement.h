@@ -41,7 +41,6 @@ class Refinement {
   std::set<ImageId> FindBadViews(const Judged& candidate, const RoundOutcome& outcome);
   std::string FindTurn(const std::map<ImageId, double>& turns_deg, ImageId image_id) const;
   std::map<ImageId, double> TurnsDeg(const Reconstruction& model) const;
-  void PutBack(const std::set<ImageId>& image_ids, Reconstruction& model) const;
   void DescribeViews(RefineModelResult& result) const;
   void AddUncertainty(RefineModelResult& result) const;
   void PutBackUnsupported();
