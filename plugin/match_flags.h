@@ -2,6 +2,7 @@
 #pragma once
 
 #include "matching/sift.h"
+#include "plugin/expected_errors.h"
 #include "plugin/flags.h"
 #include "plugin/match_stage.h"
 
@@ -12,12 +13,12 @@ class MatchFlags {
  public:
   void Declare(Flags& flags);
   void ApplyTo(SiftOptions& sift, MatchStageOptions& match) const;
+  const ExpectedErrors& errors() const { return errors_; }
 
  private:
   SiftOptions sift_;
   MatchStageOptions match_;
-  double focal_percent_ = 100.0 * PredictionUncertainty().focal;
-  double depth_percent_ = 100.0 * PredictionUncertainty().depth;
+  ExpectedErrors errors_;
 };
 
 }  // namespace vgtw

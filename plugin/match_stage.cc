@@ -137,11 +137,10 @@ MatchViewsOptions MatchStage::ViewOptions() const {
   for (const StageImage& image : images_) {
     centres.push_back(OriginInSource(image.view.cam_from_world));
   }
-  double unit = Diameter(centres);
-  if (!middle_depths_.empty()) unit = std::min(unit, Median(middle_depths_));
   MatchViewsOptions options = options_.views;
   options.num_threads = options_.num_threads;
-  options.pair.uncertainty.centre = options_.centre_percent / 100.0 * unit;
+  options.pair.uncertainty.centre =
+      options_.centre_percent / 100.0 * ErrorUnit(centres, middle_depths_);
   return options;
 }
 

@@ -266,7 +266,8 @@ json Pipeline::MatchByColmap() {
 }
 
 void Pipeline::Refine() {
-  const json inputs = {{"options", OptionsAsJson(options_)["refine"]}};
+  const json all = OptionsAsJson(options_);
+  const json inputs = {{"options", all["refine"]}, {"priors", all["priors"]}};
   const json result = workspace_.RunStage("refine", inputs, workspace_.refined(), [&] {
     const ColmapDatabase database(workspace_.database(), ColmapDatabase::Mode::kReadOnly);
     SeedOptions seed_options;
@@ -277,6 +278,9 @@ void Pipeline::Refine() {
     const std::vector<Track> tracks = ReadTracks(database, model);
     RefineModelOptions refine = options_.refine;
     refine.num_threads = options_.num_threads;
+    PriorOptions priors = options_.priors;
+    priors.num_threads = options_.num_threads;
+    refine.priors = MakePriors(priors, &predictions_, &database, model, tracks);
     ProgressDisplay display("refine");
     refine.progress = display.Callback();
     RefineModelResult result = RefineModel(refine, model, tracks);

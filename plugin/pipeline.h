@@ -5,6 +5,7 @@
 #include "evaluation/pose_error.h"
 #include "matching/sift.h"
 #include "plugin/match_stage.h"
+#include "plugin/refine_priors.h"
 #include "refine/refine_model.h"
 #include "scene/distractor_mask.h"
 #include "scene/reprojection.h"
@@ -43,7 +44,8 @@ struct PipelineOptions {
   // For photos that were predicted as pinholes; refinement then finds the lens' distortion.
   CameraModel camera_model = CameraModel::kSimpleRadial;
   bool shared_camera = false;
-  RefineModelOptions refine;
+  RefineModelOptions refine;  // without priors, which follow from the next
+  PriorOptions priors;
 
   int num_threads = 0;
   bool overwrite = false;

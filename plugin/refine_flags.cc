@@ -25,6 +25,16 @@ void RefineFlags::Declare(Flags& flags) {
       .Add("refine_extra_params",
            &options_.refine_extra_params,
            "Refine lens distortion, where the model has it");
+  flags.Group("Priors of refinement (their errors are measured on the way)")
+      .Add("pose_priors", &priors_.poses, "Draw poses to the predicted ones")
+      .Add("focal_priors", &priors_.focal_lengths, "Draw focal lengths to the predicted ones")
+      .Add("depth_priors", &priors_.depths, "Draw points to the predicted depths")
+      .Add("centre_priors",
+           &priors_.centres,
+           "Draw camera centres to the database's pose priors, as of GPS")
+      .Add("centre_sigma",
+           &priors_.centre_sigma,
+           "Standard deviation of pose priors without covariance, metres for GPS, else their unit");
 }
 
 void RefineFlags::ApplyTo(RefineModelOptions& options) const { options = options_; }

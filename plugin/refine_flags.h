@@ -2,6 +2,7 @@
 #pragma once
 
 #include "plugin/flags.h"
+#include "plugin/refine_priors.h"
 #include "refine/refine_model.h"
 
 namespace vgtw {
@@ -11,9 +12,12 @@ class RefineFlags {
  public:
   void Declare(Flags& flags);
   void ApplyTo(RefineModelOptions& options) const;
+  // Without the errors to expect, which are flags of their own.
+  const PriorOptions& priors() const { return priors_; }
 
  private:
   RefineModelOptions options_;
+  PriorOptions priors_;
 };
 
 }  // namespace vgtw

@@ -30,6 +30,23 @@ json AsJson(const RefinedView& view) {
           {"move", view.move}};
 }
 
+// Groups of priors that took part, or why they did not.
+json AsJson(const BundlePriorsSummary& priors) {
+  json groups = json::object();
+  const auto add = [&](const char* name, const PriorGroupSummary& group) {
+    if (group.num_priors == 0 && group.message.empty()) return;
+    groups[name] = {{"num_priors", group.num_priors},
+                    {"rms_sigmas", NumberOrNull(group.final_rms)},
+                    {"message", group.message}};
+  };
+  add("rotations", priors.rotations);
+  add("pose_centres", priors.pose_centres);
+  add("centres", priors.centres);
+  add("focal_lengths", priors.focal_lengths);
+  add("depths", priors.depths);
+  return groups;
+}
+
 json AsJson(const RefineRound& round) {
   return {{"max_error_px", round.max_error_px},
           {"num_points3D", round.num_points3D},
@@ -83,7 +100,8 @@ json AsJson(const BundleAdjustmentSummary& summary) {
           {"initial_cost", summary.initial_cost},
           {"final_cost", summary.final_cost},
           {"num_iterations", summary.num_iterations},
-          {"gauge", summary.gauge}};
+          {"gauge", summary.gauge},
+          {"priors", AsJson(summary.priors)}};
 }
 
 json AsJson(const RefineModelOptions& options) {

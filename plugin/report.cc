@@ -105,7 +105,8 @@ json OptionsAsJson(const PipelineOptions& options) {
             {"focal", options.match.views.pair.uncertainty.focal},
             {"depth", options.match.views.pair.uncertainty.depth},
             {"sequential_overlap", options.sequential_overlap}}},
-          {"refine", AsJson(options.refine)}};
+          {"refine", AsJson(options.refine)},
+          {"priors", AsJson(options.priors)}};
 }
 
 json AsJson(const ReprojectionStats& stats) {

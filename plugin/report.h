@@ -14,7 +14,7 @@
 namespace vgtw {
 
 // The resolved options as run.json keeps them, grouped by the stage that they concern:
-// "mask", "features", "matches", "refine".
+// "mask", "features", "matches", "refine", "priors".
 nlohmann::json OptionsAsJson(const PipelineOptions& options);
 
 nlohmann::json AsJson(const ReprojectionStats& stats);

@@ -36,6 +36,8 @@ void RunFlags::ApplyTo(PipelineOptions& options) const {
   options.camera_model = *FindCameraModel(camera_model_);
   options.shared_camera = options_.shared_camera;
   refine_.ApplyTo(options.refine);
+  options.priors = refine_.priors();
+  options.priors.errors = match_.errors();
 }
 
 }  // namespace vgtw

@@ -2,6 +2,10 @@
 #include "plugin/static_views.h"
 
 #include "scene/confidence_histogram.h"
+#include "scene/statistics.h"
+
+#include <algorithm>
+#include <utility>
 
 namespace vgtw {
 
@@ -17,6 +21,11 @@ double ConfidenceThreshold(const StaticView& view, double keep_percent) {
   ConfidenceHistogram histogram;
   view.AddConfidencesTo(histogram);
   return histogram.ThresholdKeeping(keep_percent);
+}
+
+double ErrorUnit(const std::vector<Eigen::Vector3d>& centres, std::vector<double> middle_depths) {
+  const double extent = Diameter(centres);
+  return middle_depths.empty() ? extent : std::min(extent, Median(std::move(middle_depths)));
 }
 
 }  // namespace vgtw
