@@ -65,27 +65,64 @@ double SigmaGrowth(double confidence, double median_confidence) {
   return std::clamp(median_confidence / confidence, 1.0, kMaxSigmaGrowth);
 }
 
-void FindDepths(const PriorOptions& options,
-                const StaticView& view,
-                const Image& image,
-                PredictedImage& predicted) {
+struct KeypointDepth {
+  uint32_t row = 0;
+  double depth = 0.0;
+  double confidence = 0.0;
+};
+
+std::vector<KeypointDepth> KnownDepths(const PriorOptions& options,
+                                       const StaticView& view,
+                                       const Image& image,
+                                       const std::vector<uint32_t>& rows) {
   const double threshold = ConfidenceThreshold(view, options.keep_percent);
-  std::vector<double> confidences, depths;
-  for (const uint32_t row : predicted.rows) {
+  std::vector<KeypointDepth> depths;
+  for (const uint32_t row : rows) {
     const auto sample = view.DepthAt(image.points2D.at(row).xy);
     if (!sample || !(sample->confidence >= threshold)) continue;
     const auto depth = static_cast<double>(sample->depth);
     if (!(depth > 0.0) || !std::isfinite(depth)) continue;
-    predicted.depths.push_back({row, depth, 0.0});
-    depths.push_back(depth);
-    confidences.push_back(static_cast<double>(sample->confidence));
+    depths.push_back({row, depth, static_cast<double>(sample->confidence)});
   }
-  if (depths.empty()) return;
+  return depths;
+}
+
+// The most confident depth of each cell, the first of equal ones.
+std::vector<KeypointDepth> Thin(const std::vector<KeypointDepth>& depths,
+                                const Image& image,
+                                const Camera& camera,
+                                int num_cells) {
+  std::map<std::pair<int, int>, KeypointDepth> best;
+  for (const KeypointDepth& depth : depths) {
+    const Eigen::Vector2d& xy = image.points2D[depth.row].xy;
+    const std::pair cell(static_cast<int>(xy.x() * num_cells / static_cast<double>(camera.width)),
+                         static_cast<int>(xy.y() * num_cells / static_cast<double>(camera.height)));
+    const auto [found, is_new] = best.try_emplace(cell, depth);
+    if (!is_new && depth.confidence > found->second.confidence) found->second = depth;
+  }
+  std::vector<KeypointDepth> thinned;
+  for (const auto& [cell, depth] : best) thinned.push_back(depth);
+  return thinned;
+}
+
+void FindDepths(const PriorOptions& options,
+                const StaticView& view,
+                const Image& image,
+                PredictedImage& predicted) {
+  const std::vector<KeypointDepth> known = KnownDepths(options, view, image, predicted.rows);
+  if (known.empty()) return;
+  std::vector<double> depths, confidences;
+  for (const KeypointDepth& depth : known) {
+    depths.push_back(depth.depth);
+    confidences.push_back(depth.confidence);
+  }
   predicted.middle_depth = Median(std::move(depths));
-  const double median_confidence = Median(confidences);
-  for (size_t i = 0; i < confidences.size(); ++i) {
-    predicted.depths[i].log_sigma =
-        options.errors.depth_percent / 100.0 * SigmaGrowth(confidences[i], median_confidence);
+  const double median_confidence = Median(std::move(confidences));
+  const double log_sigma = options.errors.depth_percent / 100.0;
+  for (const KeypointDepth& depth :
+       Thin(known, image, view.view().camera, options.num_depth_cells)) {
+    predicted.depths.push_back(
+        {depth.row, depth.depth, log_sigma * SigmaGrowth(depth.confidence, median_confidence)});
   }
 }
 
@@ -195,6 +232,7 @@ void PriorOptions::Check() const {
   check_share(keep_percent, "PriorOptions::keep_percent");
   VGTW_CHECK(distractor_threshold > 0.0 && distractor_threshold <= 1.0,
              "PriorOptions::distractor_threshold");
+  VGTW_CHECK(num_depth_cells >= 1, "PriorOptions::num_depth_cells");
   VGTW_CHECK(centre_sigma > 0.0 && std::isfinite(centre_sigma),
              "centre_sigma = " + std::to_string(centre_sigma) + ", must be finite and > 0");
 }
@@ -210,6 +248,7 @@ nlohmann::json AsJson(const PriorOptions& options) {
           {"expected_depth_percent", options.errors.depth_percent},
           {"centre_sigma", options.centre_sigma},
           {"keep_percent", options.keep_percent},
+          {"num_depth_cells", options.num_depth_cells},
           {"distractor_threshold", options.distractor_threshold}};
 }
 

@@ -140,8 +140,25 @@ TEST_F(PredictionPriorsTest, LowConfidenceWidensTheSigmaOfADepth) {
   EXPECT_THAT(Make(prediction, options).depths.by_image.at(1), SizeIs(1));
 }
 
+// Two columns: the third keypoint has the right one, of the other two the more confident is taken.
+TEST_F(PredictionPriorsTest, ACellHasItsMostConfidentDepth) {
+  Prediction prediction = MakeWallPrediction();
+  ViewPrediction& view = prediction.views[0];
+  view.depth_conf = ConfidenceMap(32, 24, 1.0f);
+  for (int x = -1; x <= 1; ++x) view.depth_conf(kColumns[1] + x, kRow) = 2.0f;
+  PriorOptions options = AllOfPredictions();
+  options.num_depth_cells = 2;
+  const auto depths = Make(prediction, options).depths.by_image;
+  ASSERT_THAT(depths.at(1), SizeIs(2));
+  EXPECT_EQ(depths.at(1)[0].point2D_idx, 1u);
+  EXPECT_EQ(depths.at(1)[1].point2D_idx, 2u);
+  // Of equal ones the first.
+  EXPECT_EQ(depths.at(2)[0].point2D_idx, 0u);
+}
+
 TEST_F(PredictionPriorsTest, OnlyWhatIsAskedForIsMade) {
-  const PriorOptions none;
+  PriorOptions none;
+  none.poses = none.focal_lengths = none.depths = false;
   const BundlePriors priors = Make(MakeWallPrediction(), none);
   EXPECT_THAT(priors.poses.by_image, IsEmpty());
   EXPECT_THAT(priors.focal_lengths, IsEmpty());
