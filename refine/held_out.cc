@@ -151,4 +151,10 @@ std::vector<ImageId> HeldOutJudge::FindWorse(const Errors& before,
   return worse;
 }
 
+bool HeldOutJudge::IsWorse(const Errors& before, const Errors& after, double num_sigmas) const {
+  Mean difference;
+  for (size_t i = 0; i < before.size(); ++i) difference.Add(Loss(after[i]) - Loss(before[i]));
+  return difference.num > 0 && difference.Value() > num_sigmas * difference.StandardError();
+}
+
 }  // namespace vgtw

@@ -44,6 +44,9 @@ class HeldOutJudge {
                                  const Errors& after,
                                  double num_sigmas) const;
 
+  // Whether all observations together did.
+  bool IsWorse(const Errors& before, const Errors& after, double num_sigmas) const;
+
  private:
   double Loss(double error_px) const;
 

@@ -24,8 +24,9 @@ struct RefineModelOptions {
   uint64_t seed = 0;  // of the choice of these tracks
   // Views with fewer supporting observations (see below) are not refined.
   int min_num_observations = 30;
-  // Nor are views that would turn by more than this and more than 4 times what the views turn in
-  // the median, for a seed's errors are of one size; (0, 180].
+  // Nor are views that would turn by more than this, more than their observations say that they
+  // are off and more than 4 times what the views turn in the median, for a seed's errors are of one
+  // size; (0, 180].
   double max_turn_deg = 5.0;
   double max_error_px = 4.0;   // of observations in the end; > 0
   double min_angle_deg = 1.5;  // of points; in [0, 90)
@@ -96,8 +97,8 @@ std::map<ImageId, size_t> NumSupportingObservations(const Reconstruction& model)
 // robustly at the scale of the error that is measured and drops what does not fit; the first limit
 // follows from the error of the seed itself. Tracks that were held out judge each round: a view
 // that they find worse than the seed, or much worse than the round before, goes back to its last
-// good pose, the round is repeated without it, and a round that raises their mean error is undone.
-// So with
+// good pose and the round is repeated without it, unless this leaves the view worse still; a round
+// that raises their mean error by more than chance is undone. So with
 //   held_out = the mean error of all observations held out, robust and bounded (refine/held_out.h)
 // held_out_after_px <= held_out_before_px, and where nothing helps the refined model has the seed's
 // poses and intrinsics bit by bit. Models stay in the world of the seed (refine/align.h).

@@ -6,7 +6,9 @@
 #include "scene/statistics.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <utility>
 
 namespace vgtw {
@@ -24,9 +26,11 @@ constexpr double kMaxGrowth = 1.25;
 constexpr double kMaxMedianTurns = 4.0;
 // So often is a round repeated without views that it left worse.
 constexpr int kMaxRepeats = 3;
-// Mean errors held out that differ by less than this share are alike; the later round, which had
-// tighter limits, is taken.
+// Mean errors held out are alike if they differ by less than the first share, or by less than the
+// second and so many standard errors; the later round, which had tighter limits, is taken.
 constexpr double kTie = 0.002;
+constexpr double kMaxTie = 0.02;
+constexpr double kTieSigmas = 1.0;
 // A round that lowers the mean error held out by less than this share is the last one.
 constexpr double kMinGain = 0.01;
 
@@ -109,41 +113,66 @@ std::map<ImageId, double> Refinement::TurnsDeg(const Reconstruction& model) cons
   return turns_deg;
 }
 
-// Why a view's turn is not believed; "" if it is.
-std::string Refinement::FindTurn(const std::map<ImageId, double>& turns_deg,
-                                 ImageId image_id) const {
-  const double limit_deg =
-      std::max(options_.max_turn_deg, kMaxMedianTurns * Median(Values(turns_deg)));
-  const double turn_deg = turns_deg.at(image_id);
-  if (turn_deg <= limit_deg) return "";
-  return "refinement would turn it by " + Tenths(turn_deg) + " deg, at most " + Tenths(limit_deg) +
-         " are believed";
+// A view may turn by what its observations say that it is off.
+double Refinement::MaxTurnDeg(ImageId image_id) const {
+  const Camera& camera = seed_.cameras.at(seed_.images.at(image_id).camera_id);
+  const double off_rad =
+      std::atan2(first_limits_.max_error_px.at(image_id), camera.MeanFocalLength());
+  return std::max(options_.max_turn_deg, off_rad * 180.0 / std::numbers::pi);
 }
 
-// Views of an adjusted model that are worse than before, or not believed.
-std::set<ImageId> Refinement::FindBadViews(const Judged& candidate, const RoundOutcome& outcome) {
-  std::set<ImageId> bad;
+std::map<ImageId, std::string> Refinement::FindTurnedViews(const Judged& candidate,
+                                                           const RoundOutcome& outcome) const {
+  std::map<ImageId, std::string> turned;
   const std::map<ImageId, double> turns_deg = TurnsDeg(candidate.model);
-  const std::string reason = "refinement would raise the error of its tracks held out";
-  for (const ImageId id : judge_.FindWorse(seed_errors_, candidate.errors, kWorseSigmas)) {
-    if (!outcome.adjusted.contains(id)) continue;
-    bad.insert(id);
-    rejected_[id] = reason;
+  const double usual_deg = kMaxMedianTurns * Median(Values(turns_deg));
+  for (const ImageId id : outcome.adjusted) {
+    const double limit_deg = std::max(MaxTurnDeg(id), usual_deg);
+    if (turns_deg.at(id) <= limit_deg) continue;
+    turned[id] = "refinement would turn it by " + Tenths(turns_deg.at(id)) + " deg, at most " +
+                 Tenths(limit_deg) + " are believed";
   }
+  return turned;
+}
+
+std::set<ImageId> Refinement::FindWorseViews(const Judged& candidate,
+                                             const RoundOutcome& outcome) const {
+  std::set<ImageId> worse;
   const auto before_px = judge_.MeanPxByImage(good_.errors);
   const auto after_px = judge_.MeanPxByImage(candidate.errors);
+  for (const ImageId id : judge_.FindWorse(seed_errors_, candidate.errors, kWorseSigmas)) {
+    worse.insert(id);
+  }
   for (const ImageId id : judge_.FindWorse(good_.errors, candidate.errors, kWorseSigmas)) {
-    if (!outcome.adjusted.contains(id) || after_px.at(id) < kMaxGrowth * before_px.at(id)) continue;
-    bad.insert(id);
+    if (after_px.at(id) >= kMaxGrowth * before_px.at(id)) worse.insert(id);
+  }
+  std::erase_if(worse, [&](ImageId id) { return !outcome.adjusted.contains(id); });
+  return worse;
+}
+
+bool Refinement::Exclude(const Judged& candidate,
+                         const RoundOutcome& outcome,
+                         ExcludedViews& excluded) {
+  const auto error_px = judge_.MeanPxByImage(candidate.errors);
+  // Where a seed is far off, robust points follow some of its views and leave others: the errors of
+  // the former are small, and better poses raise them. Held among better poses they are larger yet.
+  size_t num_changed = std::erase_if(excluded.held, [&](ImageId id) {
+    const auto refined = excluded.refined_px.find(id);
+    return refined != excluded.refined_px.end() && error_px.at(id) > refined->second &&
+           excluded.trusted.insert(id).second;
+  });
+  for (const ImageId id : FindWorseViews(candidate, outcome)) {
+    if (excluded.trusted.contains(id)) continue;
+    excluded.refined_px[id] = error_px.at(id);
+    rejected_[id] = "refinement would raise the error of its tracks held out";
+    num_changed += excluded.held.insert(id).second;
+  }
+  for (const auto& [id, reason] : FindTurnedViews(candidate, outcome)) {
+    excluded.refined_px.erase(id);
     rejected_[id] = reason;
+    num_changed += excluded.held.insert(id).second;
   }
-  for (const ImageId id : outcome.adjusted) {
-    const std::string turn = FindTurn(turns_deg, id);
-    if (turn.empty()) continue;
-    bad.insert(id);
-    rejected_[id] = turn;
-  }
-  return bad;
+  return num_changed > 0;
 }
 
 std::optional<Judged> Refinement::Attempt(const RoundLimits& limits,
@@ -162,39 +191,41 @@ std::optional<Judged> Refinement::Attempt(const RoundLimits& limits,
   return Judge(std::move(model));
 }
 
+bool Refinement::IsAsGood(const Judged& candidate) const {
+  if (candidate.mean_px < (1.0 + kTie) * good_.mean_px) return true;
+  return candidate.mean_px < (1.0 + kMaxTie) * good_.mean_px &&
+         !judge_.IsWorse(good_.errors, candidate.errors, kTieSigmas);
+}
+
 bool Refinement::RunRound(RoundLimits& limits) {
   RefineRound round;
   round.max_error_px = limits.MedianPx();
-  std::set<ImageId> held;
+  ExcludedViews excluded;
   RoundOutcome outcome;
   BundlePriors priors;
   std::optional<Judged> candidate;
   for (int i = 0; i <= kMaxRepeats; ++i) {
     priors = priors_;
-    candidate = Attempt(limits, held, priors, outcome);
-    if (!candidate) break;
-    const std::set<ImageId> bad = FindBadViews(*candidate, outcome);
-    if (bad.empty()) break;
-    held.insert(bad.begin(), bad.end());
-    if (2 * held.size() > outcome.adjusted.size()) {
+    candidate = Attempt(limits, excluded.held, priors, outcome);
+    if (!candidate || !Exclude(*candidate, outcome, excluded)) break;
+    if (2 * excluded.held.size() > outcome.adjusted.size()) {
       candidate.reset();  // no round that a minority could save
       break;
     }
     if (i < kMaxRepeats) continue;
-    PutBack(held, good_.model, candidate->model);
+    PutBack(excluded.held, good_.model, candidate->model);
     candidate = Judge(std::move(candidate->model));
   }
-  for (const ImageId id : held) round.put_back.push_back(seed_.images.at(id).name);
+  for (const ImageId id : excluded.held) round.put_back.push_back(seed_.images.at(id).name);
   if (candidate) {
     limits.Tighten(outcome.median_px);
     round.num_points3D = candidate->model.points3D.size();
     round.median_px = Median(Values(outcome.median_px));
     round.held_out_px = candidate->mean_px;
-    round.is_accepted =
-        candidate->mean_px <= start_px_ && candidate->mean_px < (1.0 + kTie) * good_.mean_px;
+    round.is_accepted = candidate->mean_px <= start_px_ && IsAsGood(*candidate);
     round.adjustment = outcome.adjustment;
     for (const ImageId id : outcome.adjusted) {
-      if (round.is_accepted && !held.contains(id)) rejected_.erase(id);
+      if (round.is_accepted && !excluded.held.contains(id)) rejected_.erase(id);
     }
   }
   rounds_.push_back(round);

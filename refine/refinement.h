@@ -20,6 +20,13 @@ struct Judged {
   double mean_px = 0.0;
 };
 
+// Views that take no part in a round.
+struct ExcludedViews {
+  std::set<ImageId> held;
+  std::map<ImageId, double> refined_px;  // error of those that were worse when they took part
+  std::set<ImageId> trusted;             // take part, whatever is found
+};
+
 // One call of RefineModel (refine/refine_model.h). Keeps references to the arguments.
 class Refinement {
  public:
@@ -36,10 +43,17 @@ class Refinement {
                                 const std::set<ImageId>& held,
                                 BundlePriors& priors,
                                 RoundOutcome& outcome) const;
+  bool IsAsGood(const Judged& candidate) const;
   // One round, repeated without the views that it leaves worse. Whether it is worth another one.
   bool RunRound(RoundLimits& limits);
-  std::set<ImageId> FindBadViews(const Judged& candidate, const RoundOutcome& outcome);
-  std::string FindTurn(const std::map<ImageId, double>& turns_deg, ImageId image_id) const;
+  // Views of an adjusted model that are worse than before.
+  std::set<ImageId> FindWorseViews(const Judged& candidate, const RoundOutcome& outcome) const;
+  // Those that turned too far to be believed, and why.
+  std::map<ImageId, std::string> FindTurnedViews(const Judged& candidate,
+                                                 const RoundOutcome& outcome) const;
+  // Whether the views that are held changed, after a look at what came of holding them.
+  bool Exclude(const Judged& candidate, const RoundOutcome& outcome, ExcludedViews& excluded);
+  double MaxTurnDeg(ImageId image_id) const;
   std::map<ImageId, double> TurnsDeg(const Reconstruction& model) const;
   void DescribeViews(RefineModelResult& result) const;
   void AddUncertainty(RefineModelResult& result) const;

@@ -120,6 +120,10 @@ TEST(HeldOutJudge, FindsWorseImagesByHand) {
   EXPECT_EQ(judge.FindWorse(before, after, 3.4), std::vector<ImageId>{1});
   EXPECT_EQ(judge.FindWorse(before, after, 3.5), std::vector<ImageId>{});
   EXPECT_EQ(judge.FindWorse(after, before, 0.0), std::vector<ImageId>{});
+  // Both images: differences 1, 0, 2, 0, 3, 0, mean 1, standard error sqrt(8/6 / 5) = 0.516.
+  EXPECT_TRUE(judge.IsWorse(before, after, 1.9));
+  EXPECT_FALSE(judge.IsWorse(before, after, 2.0));
+  EXPECT_FALSE(judge.IsWorse(after, before, 0.0));
   EXPECT_EQ(judge.FindWorse(after, after, 0.0), std::vector<ImageId>{});
 }
 
