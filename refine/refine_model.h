@@ -34,7 +34,7 @@ struct RefineModelOptions {
   bool refine_principal_point = false;
   bool refine_extra_params = true;  // distortion, where the camera's model has it
   // What is known besides pixels. Stated sigmas are where the measured ones start from: residuals
-  // give them anew after every adjustment.
+  // give them anew after every adjustment (of up to 1500 poses and intrinsics).
   BundlePriors priors;
   int num_threads = 0;        // 0 = all cores
   ProgressCallback progress;  // (rounds done, rounds at most)

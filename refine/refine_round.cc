@@ -16,6 +16,8 @@ namespace {
 constexpr double kCoarseTolerance = 1e-4;
 constexpr double kFineTolerance = 1e-7;
 constexpr double kMaxMedians = 6.0;
+// Uncertainties of more parameters take longer than the adjustment; priors keep their sigmas then.
+constexpr int kMaxParametersInRounds = 1500;
 // Keypoints are not better than that, however few there are.
 constexpr double kMinSigmaPx = 0.1;
 
@@ -147,8 +149,11 @@ RoundOutcome RunRefineRound(const RefineModelOptions& options,
     outcome.adjustment = AdjustBundle(adjustment, model);
     if (!outcome.adjustment.success) return {};
     if (HasEntries(priors)) {
-      const Uncertainty uncertainty = EstimateUncertainty(adjustment, model);
-      ScaleSigmas(outcome.adjustment.priors, uncertainty.prior_redundancies, priors);
+      const Uncertainty uncertainty =
+          EstimateUncertainty(adjustment, model, {kMaxParametersInRounds});
+      if (uncertainty.success) {
+        ScaleSigmas(outcome.adjustment.priors, uncertainty.prior_redundancies, priors);
+      }
     }
     outcome.median_px = MedianErrorsPx(model);
     current.Tighten(outcome.median_px);
