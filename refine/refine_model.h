@@ -102,6 +102,8 @@ std::map<ImageId, size_t> NumSupportingObservations(const Reconstruction& model)
 //   held_out = the mean error of all observations held out, robust and bounded (refine/held_out.h)
 // held_out_after_px <= held_out_before_px, and where nothing helps the refined model has the seed's
 // poses and intrinsics bit by bit. Models stay in the world of the seed (refine/align.h).
+// Where the observations determine focal lengths no better than to 1 %, intrinsics stay the seed's
+// unless what is held out asks for others: they would take up noise, and the poses with them.
 // Views whose pose or camera cannot be used (not finite) are left out of both models.
 // Points of `seed` are starts for triangulation, nothing else.
 RefineModelResult RefineModel(const RefineModelOptions& options,

@@ -31,20 +31,17 @@ constexpr int kMaxRepeats = 3;
 constexpr double kTie = 0.002;
 constexpr double kMaxTie = 0.02;
 constexpr double kTieSigmas = 1.0;
+// Focal lengths that are known no better (relative) may be any that fits.
+constexpr double kWeakFocalSigma = 0.01;
+// So many poses and intrinsics are never weak in all; their uncertainty would take long.
+constexpr int kMaxParametersOfWeak = 1500;
 // A round that lowers the mean error held out by less than this share is the last one.
 constexpr double kMinGain = 0.01;
-
-std::string Count(size_t num, const std::string& what) { return std::to_string(num) + " " + what; }
 
 std::string Tenths(double value) {
   char text[32];
   std::snprintf(text, sizeof(text), "%.1f", value);
   return text;
-}
-
-bool HasMoved(const Rigid3d& before, const Rigid3d& after) {
-  return before.translation != after.translation ||
-         before.rotation.coeffs() != after.rotation.coeffs();
 }
 
 std::vector<double> Values(const std::map<ImageId, double>& by_image) {
@@ -175,12 +172,13 @@ bool Refinement::Exclude(const Judged& candidate,
   return num_changed > 0;
 }
 
-std::optional<Judged> Refinement::Attempt(const RoundLimits& limits,
+std::optional<Judged> Refinement::Attempt(const RefineModelOptions& options,
+                                          Reconstruction model,
+                                          const RoundLimits& limits,
                                           const std::set<ImageId>& held,
                                           BundlePriors& priors,
                                           RoundOutcome& outcome) const {
-  Reconstruction model = good_.model;
-  outcome = RunRefineRound(options_, split_.adjusted, held, limits, priors, model);
+  outcome = RunRefineRound(options, split_.adjusted, held, limits, priors, model);
   if (outcome.adjusted.empty()) return std::nullopt;
   std::set<ImageId> still;
   for (const auto& [id, image] : model.images) {
@@ -206,7 +204,7 @@ bool Refinement::RunRound(RoundLimits& limits) {
   std::optional<Judged> candidate;
   for (int i = 0; i <= kMaxRepeats; ++i) {
     priors = priors_;
-    candidate = Attempt(limits, excluded.held, priors, outcome);
+    candidate = Attempt(options_, good_.model, limits, excluded.held, priors, outcome);
     if (!candidate || !Exclude(*candidate, outcome, excluded)) break;
     if (2 * excluded.held.size() > outcome.adjusted.size()) {
       candidate.reset();  // no round that a minority could save
@@ -234,6 +232,47 @@ bool Refinement::RunRound(RoundLimits& limits) {
   good_ = std::move(*candidate);
   priors_ = std::move(priors);
   return has_gained;
+}
+
+bool Refinement::AreIntrinsicsWeak() const {
+  const Reconstruction model = TriangulateAll(good_.model);
+  const Uncertainty uncertainty =
+      EstimateUncertainty(AdjustmentOf(options_, model, priors_), model, {kMaxParametersOfWeak});
+  if (!uncertainty.success) return false;
+  return std::any_of(
+      uncertainty.camera_sigmas.begin(), uncertainty.camera_sigmas.end(), [&](const auto& entry) {
+        const double sigma = entry.second.front() / model.cameras.at(entry.first).MeanFocalLength();
+        return !(sigma < kWeakFocalSigma);
+      });
+}
+
+void Refinement::TryFewerIntrinsics(const RoundLimits& limits) {
+  if (!options_.refine_focal_length || !AreIntrinsicsWeak()) return;
+  for (const bool refine_focal_length : {false, true}) {
+    RefineModelOptions fewer = options_;
+    fewer.refine_focal_length = refine_focal_length;
+    fewer.refine_principal_point = false;
+    fewer.refine_extra_params = false;
+    Reconstruction model = good_.model;
+    for (auto& [id, camera] : model.cameras) {
+      const Camera refined = camera;
+      camera = seed_.cameras.at(id);
+      if (!refine_focal_length) continue;
+      camera.SetFocalLength(refined.FocalLengthX(), refined.FocalLengthY());
+    }
+    RoundOutcome outcome;
+    BundlePriors priors = priors_;
+    std::optional<Judged> candidate = Attempt(fewer, std::move(model), limits, {}, priors, outcome);
+    if (!candidate || candidate->mean_px > start_px_ ||
+        judge_.IsWorse(good_.errors, candidate->errors, kWorseSigmas) ||
+        !FindWorseViews(*candidate, outcome).empty() ||
+        !FindTurnedViews(*candidate, outcome).empty()) {
+      continue;
+    }
+    good_ = std::move(*candidate);
+    priors_ = std::move(priors);
+    return;
+  }
 }
 
 // Views that moved and yet are not tied down by what reprojects well: their observations are wrong.
@@ -291,6 +330,7 @@ RefineModelResult Refinement::Run() {
     // The same again would come of the same limits and poses.
     if (!has_gained && limits == before_round) break;
   }
+  TryFewerIntrinsics(limits);
   PutBackUnsupported();
   if (good_.mean_px > start_px_) good_ = Judge(seed_);
   result.feedforward = TriangulateAll(seed_, first_limits_.max_error_px);
@@ -300,56 +340,6 @@ RefineModelResult Refinement::Run() {
   DescribeViews(result);
   if (result.IsRefined()) AddUncertainty(result);
   return result;
-}
-
-void Refinement::DescribeViews(RefineModelResult& result) const {
-  const auto supporting = NumSupportingObservations(result.refined);
-  const auto num_held_out = judge_.NumObservations();
-  const auto before = judge_.MeanPxByImage(seed_errors_);
-  const auto after = judge_.MeanPxByImage(good_.errors);
-  for (const auto& [id, image] : result.refined.images) {
-    const Rigid3d& seed_pose = seed_.images.at(id).cam_from_world;
-    RefinedView& view = result.views[id];
-    view.name = image.name;
-    view.num_supporting = supporting.at(id);
-    view.num_observations = static_cast<size_t>(
-        std::count_if(image.points2D.begin(), image.points2D.end(), [](const Point2D& point2D) {
-          return point2D.HasPoint3D();
-        }));
-    if (num_held_out.contains(id)) {
-      view.num_held_out = num_held_out.at(id);
-      view.held_out_before_px = before.at(id);
-      view.held_out_after_px = after.at(id);
-    }
-    view.turn_deg = AngleBetweenDeg(seed_pose.rotation, image.cam_from_world.rotation);
-    view.move = (OriginInSource(seed_pose) - OriginInSource(image.cam_from_world)).norm();
-    const auto rejected = rejected_.find(id);
-    if (HasMoved(seed_pose, image.cam_from_world)) {
-      view.outcome = ViewOutcome::kRefined;
-    } else if (rejected != rejected_.end()) {
-      view.outcome = ViewOutcome::kRejected;
-      view.reason = rejected->second;
-    } else if (view.num_supporting < static_cast<size_t>(options_.min_num_observations)) {
-      view.reason = Count(view.num_supporting, "observations of points that three photos see, ") +
-                    "at least " + std::to_string(options_.min_num_observations) + " are needed";
-    } else {
-      view.reason = "no round lowered the error of tracks held out";
-    }
-  }
-}
-
-void Refinement::AddUncertainty(RefineModelResult& result) const {
-  BundleAdjustmentOptions adjustment = AdjustmentOf(options_, result.refined, priors_);
-  for (const auto& [id, view] : result.views) {
-    if (view.outcome != ViewOutcome::kRefined) adjustment.fixed_images.insert(id);
-  }
-  result.uncertainty = EstimateUncertainty(adjustment, result.refined);
-  for (auto& [id, view] : result.views) {
-    const auto pose = result.uncertainty.poses.find(id);
-    if (view.outcome != ViewOutcome::kRefined || pose == result.uncertainty.poses.end()) continue;
-    view.sigma_rotation_deg = pose->second.rotation_deg;
-    view.sigma_centre = pose->second.centre;
-  }
 }
 
 }  // namespace vgtw

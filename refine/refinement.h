@@ -27,6 +27,9 @@ struct ExcludedViews {
   std::set<ImageId> trusted;             // take part, whatever is found
 };
 
+// Whether the poses differ in a bit.
+bool HasMoved(const Rigid3d& before, const Rigid3d& after);
+
 // One call of RefineModel (refine/refine_model.h). Keeps references to the arguments.
 class Refinement {
  public:
@@ -38,12 +41,18 @@ class Refinement {
 
  private:
   Judged Judge(Reconstruction model) const;
-  // Adjusts the last good model without the images in `held`; nullopt if nothing could be adjusted.
-  std::optional<Judged> Attempt(const RoundLimits& limits,
+  // Adjusts `model` without the images in `held`; nullopt if nothing could be adjusted.
+  std::optional<Judged> Attempt(const RefineModelOptions& options,
+                                Reconstruction model,
+                                const RoundLimits& limits,
                                 const std::set<ImageId>& held,
                                 BundlePriors& priors,
                                 RoundOutcome& outcome) const;
   bool IsAsGood(const Judged& candidate) const;
+  // Where the observations hardly determine the intrinsics, these take up noise and the poses with
+  // them: those of the seed stay unless what is held out asks for others.
+  bool AreIntrinsicsWeak() const;
+  void TryFewerIntrinsics(const RoundLimits& limits);
   // One round, repeated without the views that it leaves worse. Whether it is worth another one.
   bool RunRound(RoundLimits& limits);
   // Views of an adjusted model that are worse than before.
