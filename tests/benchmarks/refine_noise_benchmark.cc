@@ -36,10 +36,10 @@ using namespace vgtw;  // NOLINT(google-build-using-namespace): a program
 constexpr double kFloorLevelDeg = 0.05;
 
 Eigen::Vector3d RandomVector(std::mt19937& random, double rms_length) {
-  std::normal_distribution<double> normal(0.0, rms_length / std::sqrt(3.0));
+  std::normal_distribution<double> normal;
   const double x = normal(random);
   const double y = normal(random);
-  return {x, y, normal(random)};
+  return rms_length / std::sqrt(3.0) * Eigen::Vector3d(x, y, normal(random));
 }
 
 Reconstruction WithErrors(Reconstruction model, double level_deg, unsigned seed) {

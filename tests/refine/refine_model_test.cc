@@ -30,9 +30,9 @@ SyntheticModelOptions Scene() {
 void Perturb(double rotation_deg, unsigned seed, Reconstruction& model) {
   PerturbPoses(model, rotation_deg, 0.11 * rotation_deg, seed);
   std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0.0, 0.04 * rotation_deg);
+  std::normal_distribution<double> normal;
   for (auto& [id, camera] : model.cameras) {
-    const double factor = std::exp(normal(random));
+    const double factor = std::exp(0.04 * rotation_deg * normal(random));
     camera.SetFocalLength(factor * camera.FocalLengthX(), factor * camera.FocalLengthY());
   }
 }

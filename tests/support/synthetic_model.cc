@@ -12,10 +12,10 @@ namespace vgtw {
 namespace {
 
 Eigen::Vector3d RandomVector(std::mt19937& random, double rms_length) {
-  std::normal_distribution<double> normal(0.0, rms_length / std::sqrt(3.0));
+  std::normal_distribution<double> normal;
   const double x = normal(random);
   const double y = normal(random);
-  return {x, y, normal(random)};
+  return rms_length / std::sqrt(3.0) * Eigen::Vector3d(x, y, normal(random));
 }
 
 }  // namespace
@@ -72,7 +72,7 @@ Reconstruction MakeSyntheticModel(const SyntheticModelOptions& options) {
 
 void ProjectAgain(Reconstruction& reconstruction, double sigma_px, unsigned seed) {
   std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0.0, 1.0);
+  std::normal_distribution<double> normal;
   for (auto& [image_id, image] : reconstruction.images) {
     const Camera& camera = reconstruction.cameras.at(image.camera_id);
     for (Point2D& point2D : image.points2D) {
@@ -92,10 +92,10 @@ void PerturbPoses(Reconstruction& reconstruction,
                   unsigned seed,
                   ImageId kept_image_id) {
   std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0.0, rotation_deg);
+  std::normal_distribution<double> normal;
   for (auto& [image_id, image] : reconstruction.images) {
     const Eigen::Vector3d axis = RandomVector(random, 1.0).normalized();
-    const Eigen::Quaterniond change = RotationAboutAxis(axis, normal(random));
+    const Eigen::Quaterniond change = RotationAboutAxis(axis, rotation_deg * normal(random));
     const Eigen::Vector3d centre =
         OriginInSource(image.cam_from_world) + RandomVector(random, centre_distance);
     if (image_id == kept_image_id) continue;
