@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "refine/filter.h"
 
+#include "refine/ray_point.h"
 #include "scene/error.h"
 #include "scene/reprojection.h"
 
-#include <cmath>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,21 +12,6 @@
 #include <Eigen/Core>
 
 namespace vgtw {
-namespace {
-
-bool HasTriangulationAngle(const std::vector<Eigen::Vector3d>& unit_rays, double min_angle_rad) {
-  for (size_t i = 0; i < unit_rays.size(); ++i) {
-    for (size_t j = i + 1; j < unit_rays.size(); ++j) {
-      const double angle_rad =
-          std::atan2(unit_rays[i].cross(unit_rays[j]).norm(), unit_rays[i].dot(unit_rays[j]));
-      if (angle_rad >= min_angle_rad) return true;
-    }
-  }
-  return false;
-}
-
-}  // namespace
-
 void FilterOptions::Check() const {
   VGTW_CHECK(max_reprojection_error_px > 0.0,
              "FilterOptions::max_reprojection_error_px = " +
@@ -39,13 +23,12 @@ void FilterOptions::Check() const {
 
 FilterSummary FilterObservations(const FilterOptions& options, Reconstruction& reconstruction) {
   options.Check();
-  const double min_angle_rad = options.min_triangulation_angle_deg * std::numbers::pi / 180.0;
   FilterSummary summary;
   std::vector<Point3DId> bad_points;
   std::vector<TrackElement> bad_observations;
   for (const auto& [point3D_id, point] : reconstruction.points3D) {
     std::vector<TrackElement> bad;
-    std::vector<Eigen::Vector3d> unit_rays;
+    std::vector<Eigen::Vector3d> centres;
     for (const TrackElement& element : point.track) {
       const Image& image = reconstruction.images.at(element.image_id);
       const std::optional<double> error_px =
@@ -55,12 +38,14 @@ FilterSummary FilterObservations(const FilterOptions& options, Reconstruction& r
                                 ? options.max_reprojection_error_px
                                 : own->second;
       if (error_px && *error_px <= max_px) {
-        unit_rays.push_back((point.xyz - OriginInSource(image.cam_from_world)).normalized());
+        centres.push_back(OriginInSource(image.cam_from_world));
       } else {
         bad.push_back(element);
       }
     }
-    if (unit_rays.size() < 2 || !HasTriangulationAngle(unit_rays, min_angle_rad)) {
+    const double min_angle_deg = options.min_triangulation_angle_deg;
+    if (centres.size() < 2 ||
+        TriangulationAngleDeg(centres, point.xyz, min_angle_deg) < min_angle_deg) {
       bad_points.push_back(point3D_id);
       summary.num_removed_observations += point.track.size();
     } else {

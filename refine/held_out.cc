@@ -4,11 +4,11 @@
 #include "refine/ray_point.h"
 #include "scene/error.h"
 #include "scene/parallel.h"
+#include "scene/random.h"
 #include "scene/statistics.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -16,13 +16,8 @@
 namespace vgtw {
 namespace {
 
-// A number in [0, 1) that looks random: the finaliser of SplitMix64.
-double UniformOf(uint64_t key) {
-  key += 0x9e3779b97f4a7c15;
-  key = (key ^ (key >> 30)) * 0xbf58476d1ce4e5b9;
-  key = (key ^ (key >> 27)) * 0x94d049bb133111eb;
-  return static_cast<double>((key ^ (key >> 31)) >> 11) * 0x1p-53;
-}
+// Odd, so that seeds differ in all bits.
+constexpr uint64_t kSeedSpread = 0x9e3779b97f4a7c15;
 
 struct Mean {
   size_t num = 0;
@@ -51,7 +46,7 @@ SplitTracks HoldOutTracks(const std::vector<Track>& tracks, double percent, uint
   for (const Track& track : tracks) {
     if (track.empty()) continue;
     const uint64_t key = (uint64_t{track.front().image_id} << 32) | track.front().point2D_idx;
-    const bool is_held_out = 100.0 * UniformOf(key ^ (seed * 0x9e3779b97f4a7c15)) < percent;
+    const bool is_held_out = 100.0 * RandomStream(key ^ (seed * kSeedSpread)).Uniform() < percent;
     (is_held_out ? split.held_out : split.adjusted).push_back(track);
   }
   return split;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "refine/reduced_information.h"
 
+#include "refine/point_blocks.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <functional>
 #include <limits>
 #include <map>
 #include <unordered_map>
@@ -20,16 +21,6 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 
 // Of variance, against that of a block whose neighbours are known.
 constexpr double kMaxInflation = 1e10;
-
-// Index of the point whose block this is, or -1.
-std::ptrdiff_t PointIdx(std::span<const Eigen::Vector3d> points, const double* values) {
-  const std::less<const double*> before;
-  if (points.empty() || before(values, points.front().data()) ||
-      before(points.back().data(), values)) {
-    return -1;
-  }
-  return (values - points.front().data()) / 3;
-}
 
 // The residual blocks of each point, those without one last.
 std::vector<std::vector<ceres::ResidualBlockId>> GroupByPoint(
@@ -234,19 +225,27 @@ Eigen::MatrixXd InverseInformation::Covariance(const ReducedBlock& block) const 
 }
 
 double InverseInformation::Leverage(const ceres::Problem& problem,
-                                    ceres::ResidualBlockId id,
+                                    const std::vector<ceres::ResidualBlockId>& ids,
                                     const std::vector<ReducedBlock>& blocks,
                                     const ResidualWeight& weight) const {
   Evaluator evaluator(problem, {}, blocks, weight);
-  const int num_rows = problem.GetCostFunctionForResidualBlock(id)->num_residuals();
-  if (inverse_factor_.size() == 0) return num_rows;
-  Eigen::MatrixXd product = Eigen::MatrixXd::Zero(units_.size(), num_rows);
-  for (const Evaluator::Factor& factor : evaluator.Evaluate(id)) {
-    const ReducedBlock& block = *factor.block;
-    product += inverse_factor_.middleCols(block.offset, block.size) *
-               units_.segment(block.offset, block.size).asDiagonal() * factor.jacobian.transpose();
+  double leverage = 0.0;
+  for (const ceres::ResidualBlockId id : ids) {
+    const int num_rows = problem.GetCostFunctionForResidualBlock(id)->num_residuals();
+    if (inverse_factor_.size() == 0) {
+      leverage += num_rows;
+      continue;
+    }
+    Eigen::MatrixXd product = Eigen::MatrixXd::Zero(units_.size(), num_rows);
+    for (const Evaluator::Factor& factor : evaluator.Evaluate(id)) {
+      const ReducedBlock& block = *factor.block;
+      product += inverse_factor_.middleCols(block.offset, block.size) *
+                 units_.segment(block.offset, block.size).asDiagonal() *
+                 factor.jacobian.transpose();
+    }
+    leverage += std::min<double>(num_rows, product.squaredNorm());
   }
-  return std::min<double>(num_rows, product.squaredNorm());
+  return leverage;
 }
 
 }  // namespace vgtw

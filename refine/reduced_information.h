@@ -41,11 +41,11 @@ class InverseInformation {
   // other blocks were known: there it is undetermined.
   Eigen::MatrixXd Covariance(const ReducedBlock& block) const;
 
-  // trace(J S^-1 J^T) of a residual block without point, J its derivative by `blocks`, weighted:
-  // how much of its variance, of num_residuals in all, the adjustment takes away. At most that
-  // number.
+  // Sum of trace(J S^-1 J^T) over residual blocks without point, J their derivatives by `blocks`,
+  // weighted: how much of their variance, of num_residuals each, the adjustment takes away. At most
+  // that number of each.
   double Leverage(const ceres::Problem& problem,
-                  ceres::ResidualBlockId id,
+                  const std::vector<ceres::ResidualBlockId>& ids,
                   const std::vector<ReducedBlock>& blocks,
                   const ResidualWeight& weight) const;
 

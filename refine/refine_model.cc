@@ -18,9 +18,7 @@ Reconstruction UsableViews(const Reconstruction& seed) {
         FindFault(seed.cameras.at(image.camera_id)).empty()) {
       continue;
     }
-    for (uint32_t idx = 0; idx < image.points2D.size(); ++idx) {
-      if (usable.images.at(id).points2D[idx].HasPoint3D()) RemoveObservation(usable, {id, idx});
-    }
+    RemoveObservationsOf(id, usable);
     usable.images.erase(id);
     usable.rigs.clear();
     usable.frames.clear();
@@ -65,14 +63,8 @@ RefineModelResult RefineModel(const RefineModelOptions& options,
                               const std::vector<Track>& tracks) {
   options.Check();
   const Reconstruction usable = UsableViews(seed);
-  std::vector<Track> usable_tracks;
-  for (const Track& track : tracks) {
-    Track& elements = usable_tracks.emplace_back();
-    for (const TrackElement& element : track) {
-      if (usable.images.contains(element.image_id)) elements.push_back(element);
-    }
-    if (elements.size() < 2) usable_tracks.pop_back();
-  }
+  const std::vector<Track> usable_tracks =
+      TracksIn(tracks, [&](ImageId id) { return usable.images.contains(id); });
   return Refinement(options, usable, usable_tracks).Run();
 }
 

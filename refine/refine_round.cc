@@ -21,30 +21,13 @@ constexpr int kMaxParametersInRounds = 1500;
 // Keypoints are not better than that, however few there are.
 constexpr double kMinSigmaPx = 0.1;
 
-std::vector<Track> WithoutImages(const std::vector<Track>& tracks, const std::set<ImageId>& held) {
-  if (held.empty()) return tracks;
-  std::vector<Track> rest;
-  for (const Track& track : tracks) {
-    Track& elements = rest.emplace_back();
-    for (const TrackElement& element : track) {
-      if (!held.contains(element.image_id)) elements.push_back(element);
-    }
-    if (elements.size() < 2) rest.pop_back();
-  }
-  return rest;
-}
-
 // Images that too few observations tie down go, until all that stay are tied down.
 void DropWeakImages(size_t min_num_observations, Reconstruction& model) {
   for (bool is_done = false; !is_done;) {
     is_done = true;
     for (const auto& [id, num] : NumSupportingObservations(model)) {
       if (num >= min_num_observations) continue;
-      for (uint32_t idx = 0; idx < model.images.at(id).points2D.size(); ++idx) {
-        if (!model.images.at(id).points2D[idx].HasPoint3D()) continue;
-        RemoveObservation(model, {id, idx});
-        is_done = false;
-      }
+      if (RemoveObservationsOf(id, model) > 0) is_done = false;
     }
   }
 }
@@ -137,7 +120,7 @@ RoundOutcome RunRefineRound(const RefineModelOptions& options,
       static_cast<size_t>(options.min_num_observations * (1.0 - options.held_out_percent / 100.0));
   TriangulateTracks(
       {options.max_error_px, options.min_angle_deg, options.num_threads, limits.max_error_px},
-      WithoutImages(tracks, held),
+      TracksIn(tracks, [&](ImageId id) { return !held.contains(id); }),
       model);
   for (int pass = 0; pass < 2; ++pass) {
     DropWeakImages(min_num_observations, model);
@@ -163,6 +146,30 @@ RoundOutcome RunRefineRound(const RefineModelOptions& options,
   outcome.median_px = MedianErrorsPx(model);
   for (const auto& [id, median_px] : outcome.median_px) outcome.adjusted.insert(id);
   return outcome;
+}
+
+size_t RemoveObservationsOf(ImageId image_id, Reconstruction& model) {
+  const std::vector<Point2D>& points2D = model.images.at(image_id).points2D;
+  size_t num_removed = 0;
+  for (uint32_t idx = 0; idx < points2D.size(); ++idx) {
+    if (!points2D[idx].HasPoint3D()) continue;
+    RemoveObservation(model, {image_id, idx});
+    ++num_removed;
+  }
+  return num_removed;
+}
+
+std::vector<Track> TracksIn(const std::vector<Track>& tracks,
+                            const std::function<bool(ImageId)>& is_wanted) {
+  std::vector<Track> wanted;
+  for (const Track& track : tracks) {
+    Track& elements = wanted.emplace_back();
+    for (const TrackElement& element : track) {
+      if (is_wanted(element.image_id)) elements.push_back(element);
+    }
+    if (elements.size() < 2) wanted.pop_back();
+  }
+  return wanted;
 }
 
 std::map<ImageId, size_t> NumSupportingObservations(const Reconstruction& model) {

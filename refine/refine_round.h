@@ -4,6 +4,7 @@
 #include "refine/refine_model.h"
 
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <set>
 #include <vector>
@@ -28,6 +29,13 @@ struct RoundOutcome {
   std::map<ImageId, double> median_px;  // of their observations
   BundleAdjustmentSummary adjustment;   // the last one
 };
+
+// Removes all that an image observes; returns the number of observations.
+size_t RemoveObservationsOf(ImageId image_id, Reconstruction& model);
+
+// The tracks' elements in the images that are wanted, where two or more are left.
+std::vector<Track> TracksIn(const std::vector<Track>& tracks,
+                            const std::function<bool(ImageId)>& is_wanted);
 
 // Triangulates the tracks, adjusts and drops what does not fit, twice: the first pass finds the
 // poses, the second sharpens them without what the first dropped. Images in `held` and images with

@@ -276,23 +276,22 @@ void Refinement::TryFewerIntrinsics(const RoundLimits& limits) {
 }
 
 // Views that moved and yet are not tied down by what reprojects well: their observations are wrong.
-void Refinement::PutBackUnsupported() {
-  for (bool is_done = false; !is_done;) {
-    is_done = true;
+Reconstruction Refinement::PutBackUnsupported() {
+  for (;;) {
+    Reconstruction triangulated = TriangulateAll(good_.model);
     Reconstruction model = good_.model;
     std::set<ImageId> as_in_seed;
-    for (const auto& [id, num] : NumSupportingObservations(TriangulateAll(model))) {
+    bool is_done = true;
+    for (const auto& [id, num] : NumSupportingObservations(triangulated)) {
       if (!HasMoved(seed_.images.at(id).cam_from_world, model.images.at(id).cam_from_world)) {
         as_in_seed.insert(id);
       } else if (num < static_cast<size_t>(options_.min_num_observations)) {
         as_in_seed.insert(id);
-        rejected_[id] = "its new pose is supported by " + std::to_string(num) +
-                        " observations of points that three photos see, at least " +
-                        std::to_string(options_.min_num_observations) + " are needed";
+        rejected_[id] = "its new pose is supported by " + TooFewSupporting(num);
         is_done = false;
       }
     }
-    if (is_done) return;
+    if (is_done) return triangulated;
     PutBack(as_in_seed, seed_, model);
     good_ = Judge(std::move(model));
   }
@@ -331,10 +330,12 @@ RefineModelResult Refinement::Run() {
     if (!has_gained && limits == before_round) break;
   }
   TryFewerIntrinsics(limits);
-  PutBackUnsupported();
-  if (good_.mean_px > start_px_) good_ = Judge(seed_);
   result.feedforward = TriangulateAll(seed_, first_limits_.max_error_px);
-  result.refined = TriangulateAll(good_.model);
+  result.refined = PutBackUnsupported();
+  if (good_.mean_px > start_px_) {
+    good_ = Judge(seed_);
+    result.refined = TriangulateAll(seed_);
+  }
   result.rounds = rounds_;
   result.held_out_after_px = good_.mean_px;
   DescribeViews(result);

@@ -65,8 +65,10 @@ class Refinement {
   double MaxTurnDeg(ImageId image_id) const;
   std::map<ImageId, double> TurnsDeg(const Reconstruction& model) const;
   void DescribeViews(RefineModelResult& result) const;
+  std::string TooFewSupporting(size_t num) const;
   void AddUncertainty(RefineModelResult& result) const;
-  void PutBackUnsupported();
+  // Returns the last good model with the points of all tracks.
+  Reconstruction PutBackUnsupported();
   RoundLimits FirstLimits() const;
   Reconstruction TriangulateAll(const Reconstruction& poses,
                                 const std::map<ImageId, double>& max_error_px = {}) const;

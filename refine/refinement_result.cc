@@ -5,11 +5,6 @@
 #include <algorithm>
 
 namespace vgtw {
-namespace {
-
-std::string Count(size_t num, const std::string& what) { return std::to_string(num) + " " + what; }
-
-}  // namespace
 
 bool HasMoved(const Rigid3d& before, const Rigid3d& after) {
   return before.translation != after.translation ||
@@ -44,12 +39,16 @@ void Refinement::DescribeViews(RefineModelResult& result) const {
       view.outcome = ViewOutcome::kRejected;
       view.reason = rejected->second;
     } else if (view.num_supporting < static_cast<size_t>(options_.min_num_observations)) {
-      view.reason = Count(view.num_supporting, "observations of points that three photos see, ") +
-                    "at least " + std::to_string(options_.min_num_observations) + " are needed";
+      view.reason = TooFewSupporting(view.num_supporting);
     } else {
       view.reason = "no round lowered the error of tracks held out";
     }
   }
+}
+
+std::string Refinement::TooFewSupporting(size_t num) const {
+  return std::to_string(num) + " observations of points that three photos see, at least " +
+         std::to_string(options_.min_num_observations) + " are needed";
 }
 
 void Refinement::AddUncertainty(RefineModelResult& result) const {

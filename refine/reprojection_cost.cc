@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "refine/reprojection_cost.h"
 
+#include "refine/cross_matrix.h"
 #include "refine/projection.h"
 
 #include <algorithm>
@@ -16,12 +17,6 @@ namespace vgtw {
 namespace {
 
 constexpr double kMinAbsDepth = 1e-10;  // in units of the extent of the cameras
-
-Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& a) {
-  Eigen::Matrix3d matrix;
-  matrix << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
-  return matrix;
-}
 
 // Derivative of  q X = X + 2 w u x X + 2 u x (u x X)  by q = (u, w).
 Eigen::Matrix<double, 3, 4> RotatedByQuaternion(const Eigen::Quaterniond& q,

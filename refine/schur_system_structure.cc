@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What of refine/schur_system.h is done once per problem.
+#include "refine/point_blocks.h"
 #include "refine/schur_system.h"
 #include "scene/error.h"
 
 #include <algorithm>
-#include <functional>
 #include <limits>
 #include <numeric>
 #include <string>
@@ -16,12 +16,6 @@ namespace {
 
 // Times the mean number of uses of a block.
 constexpr size_t kManyUses = 4;
-
-bool IsInside(const double* values, std::span<const Eigen::Vector3d> points) {
-  if (points.empty()) return false;
-  return !std::less<>()(values, points.front().data()) &&
-         !std::less<>()(points.back().data(), values);
-}
 
 }  // namespace
 
@@ -68,10 +62,10 @@ void SchurSystem::ReadTerms(const ceres::Problem& problem) {
     problem.GetParameterBlocksForResidualBlock(id, &blocks);
     for (double* values : blocks) {
       Parameter& parameter = parameters_.emplace_back(Parameter{values, kHeld});
-      if (IsInside(values, points_)) {
+      if (const std::ptrdiff_t point = PointIdx(points_, values); point >= 0) {
         VGTW_CHECK(term.point < 0, "a residual of two points");
         parameter.block = kPoint;
-        term.point = static_cast<int>((values - points_.front().data()) / 3);
+        term.point = static_cast<int>(point);
         term.num_rows = 2;
       } else {
         const auto [block, is_new] = block_by_values.try_emplace(values, kHeld);

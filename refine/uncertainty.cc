@@ -2,6 +2,7 @@
 #include "refine/uncertainty.h"
 
 #include "refine/bundle_problem.h"
+#include "refine/cross_matrix.h"
 #include "refine/reduced_information.h"
 #include "scene/error.h"
 
@@ -20,12 +21,6 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 // Of exact data, pixels^2: their weights must stay finite.
 constexpr double kMinVariance = 1e-24;
 
-Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d skew;
-  skew << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return skew;
-}
-
 // d(w, d) / d(pose block) at a unit quaternion, see PoseUncertainty; d in the frame of the block.
 Eigen::Matrix<double, 6, kNumPoseParams> PoseByBlock(const double* block) {
   const Eigen::Quaterniond rotation(block[3], block[0], block[1], block[2]);
@@ -35,10 +30,11 @@ Eigen::Matrix<double, 6, kNumPoseParams> PoseByBlock(const double* block) {
   derivative.setZero();
   // dq = (w / 2) q, so that w = 2 vec(dq q*).
   derivative.block<3, 3>(0, 0) =
-      2.0 * (rotation.w() * Eigen::Matrix3d::Identity() + Skew(rotation.vec()));
+      2.0 * (rotation.w() * Eigen::Matrix3d::Identity() + CrossMatrix(rotation.vec()));
   derivative.block<3, 1>(0, 3) = -2.0 * rotation.vec();
   // c = -R^T t and R = Exp(w) R_0: dc = -R^T (dt + t x w).
-  derivative.block<3, 4>(3, 0) = -world_from_cam * Skew(translation) * derivative.block<3, 4>(0, 0);
+  derivative.block<3, 4>(3, 0) =
+      -world_from_cam * CrossMatrix(translation) * derivative.block<3, 4>(0, 0);
   derivative.block<3, 3>(3, 4) = -world_from_cam;
   return derivative;
 }
@@ -177,11 +173,10 @@ PriorRedundancies FindRedundancies(const BundleProblem& problem,
   const auto redundancy = [&](const PriorBlocks::ResidualBlockIds& ids) {
     if (ids.empty()) return 1.0;
     double num_residuals = 0.0;
-    double leverage = 0.0;
     for (const ceres::ResidualBlockId id : ids) {
       num_residuals += problem.problem().GetCostFunctionForResidualBlock(id)->num_residuals();
-      leverage += inverse.Leverage(problem.problem(), id, blocks, weight);
     }
+    const double leverage = inverse.Leverage(problem.problem(), ids, blocks, weight);
     return std::max(0.0, 1.0 - leverage / num_residuals);
   };
   const PriorBlocks& priors = problem.priors();

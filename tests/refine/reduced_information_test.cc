@@ -92,9 +92,9 @@ TEST(InverseInformation, LeverageIsTheShareThatAnAdjustmentTakes) {
   const ResidualWeight weight = UnitWeight;
   const InverseInformation inverse(ReduceInformation(problem, {}, blocks, weight));
   // x[0] has information 4 + 9: the first takes 4/13 of its residual away, the last 9/13.
-  EXPECT_NEAR(inverse.Leverage(problem, ids[0], blocks, weight), 4.0 / 13.0, 1e-9);
-  EXPECT_NEAR(inverse.Leverage(problem, ids[1], blocks, weight), 1.0, 1e-9);
-  EXPECT_NEAR(inverse.Leverage(problem, ids[3], blocks, weight), 9.0 / 13.0, 1e-9);
+  EXPECT_NEAR(inverse.Leverage(problem, {ids[0]}, blocks, weight), 4.0 / 13.0, 1e-9);
+  EXPECT_NEAR(inverse.Leverage(problem, {ids[1]}, blocks, weight), 1.0, 1e-9);
+  EXPECT_NEAR(inverse.Leverage(problem, {ids[3]}, blocks, weight), 9.0 / 13.0, 1e-9);
 }
 
 TEST(InverseInformation, IsNaNWhereNothingIsKnown) {
