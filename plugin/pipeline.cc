@@ -290,9 +290,8 @@ void Pipeline::Refine() {
            "points",
            "wrong poses? 'vgtw import' names suspected convention mistakes");
     }
-    for (Reconstruction* triangulated : {&result.feedforward, &result.refined}) {
-      ColorPoints(options_.image_path, *triangulated, options_.num_threads);
-    }
+    Reconstruction* const triangulated[] = {&result.feedforward, &result.refined};
+    ColorPoints(options_.image_path, triangulated, options_.num_threads);
     WriteModelOptions write;
     write.overwrite = true;
     WriteModel(result.feedforward, workspace_.feedforward(), write);

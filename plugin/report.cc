@@ -14,13 +14,6 @@ namespace {
 
 using nlohmann::json;
 
-size_t NumObservations(const Image& image) {
-  return static_cast<size_t>(
-      std::count_if(image.points2D.begin(), image.points2D.end(), [](const Point2D& point2D) {
-        return point2D.HasPoint3D();
-      }));
-}
-
 std::vector<ViewReport> ReportViews(const json& stages,
                                     const Reconstruction& feedforward,
                                     const Reconstruction& refined) {
@@ -31,7 +24,6 @@ std::vector<ViewReport> ReportViews(const json& stages,
       change_deg_by_name[view.name] = view.relative_rotation_deg;
   }
   const json& features = stages.at("features").at("result").at("views");
-  const std::map<ImageId, size_t> supporting = NumSupportingObservations(refined);
   std::vector<ViewReport> views;
   for (const auto& [id, image] : refined.images) {
     ViewReport view;
@@ -44,10 +36,10 @@ std::vector<ViewReport> ReportViews(const json& stages,
       const json& shares = stages.at("masks").at("result").at("excluded_share");
       view.excluded_share = shares.value(image.name, 0.0);
     }
-    view.num_observations = NumObservations(image);
     view.rotation_change_deg = change_deg_by_name[image.name];
-    view.num_supporting = supporting.at(id);
     const json& refinement = stages.at("refine").at("result").at("views").at(image.name);
+    view.num_observations = refinement.at("num_observations");
+    view.num_supporting = refinement.at("num_supporting_observations");
     view.outcome = refinement.at("outcome");
     view.reason = refinement.at("reason");
     views.push_back(view);

@@ -91,18 +91,22 @@ class RefineCommand : public testing::Test {
     return RunVgtw(args);
   }
 
+  ColmapRun RefineSeedBy(const std::string& database) const {
+    return Refine({"--input_path",
+                   folder_ / "seed",
+                   "--database_path",
+                   folder_ / database,
+                   "--output_path",
+                   folder_ / "refined"});
+  }
+
   const TemporaryFolder folder_;
   Reconstruction truth_;
   Reconstruction seed_;
 };
 
 TEST_F(RefineCommand, BringsPosesBackByTheMatchesOfADatabase) {
-  const ColmapRun run = Refine({"--input_path",
-                                folder_ / "seed",
-                                "--database_path",
-                                folder_ / "a.db",
-                                "--output_path",
-                                folder_ / "refined"});
+  const ColmapRun run = RefineSeedBy("a.db");
   ASSERT_EQ(run.exit_code, 0) << run.output;
   const Reconstruction refined = ReadModel(folder_ / "refined");
   EXPECT_EQ(FindFault(refined), "");
@@ -139,12 +143,7 @@ TEST_F(RefineCommand, KeepsPosesThatTheTracksCannotMend) {
   Reconstruction wrong = truth_;
   ProjectAgain(wrong, 100.0, 3);
   WriteDatabase(wrong, folder_ / "wrong.db");
-  const ColmapRun run = Refine({"--input_path",
-                                folder_ / "seed",
-                                "--database_path",
-                                folder_ / "wrong.db",
-                                "--output_path",
-                                folder_ / "refined"});
+  const ColmapRun run = RefineSeedBy("wrong.db");
   ASSERT_EQ(run.exit_code, 0) << run.output;
   const Reconstruction seed = ReadModel(folder_ / "seed");
   const Reconstruction refined = ReadModel(folder_ / "refined");
@@ -159,14 +158,7 @@ TEST_F(RefineCommand, KeepsPosesThatTheTracksCannotMend) {
 
 TEST_F(RefineCommand, ColmapReadsWhatItWrites) {
   VGTW_NEED_COLMAP();
-  ASSERT_EQ(Refine({"--input_path",
-                    folder_ / "seed",
-                    "--database_path",
-                    folder_ / "a.db",
-                    "--output_path",
-                    folder_ / "refined"})
-                .exit_code,
-            0);
+  ASSERT_EQ(RefineSeedBy("a.db").exit_code, 0);
   const ColmapRun read = RunColmap({"model_analyzer", "--path", folder_ / "refined"});
   EXPECT_THAT(read.output, HasSubstr("Registered images: 6"));
 }
