@@ -83,6 +83,7 @@ const std::vector<Command>& Commands() {
        "Photos and predictions -> masks, database, refined COLMAP model, report",
        DeclareRun,
        "  vgtw run --image_path photos/ --predictions_path predictions/ --output_path out/"},
+      {"evaluate", "Poses, points and depths against a reference, as numbers"},
       {"probe", kProbeSummary, {}, {}, BecomeNetworkProgram},
       {"weights", kWeightsSummary},
       {"weights inspect", kWeightsInspectSummary, {}, {}, BecomeNetworkProgram},
