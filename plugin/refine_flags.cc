@@ -19,6 +19,9 @@ void RefineFlags::Declare(Flags& flags) {
       .Add("max_error_px",
            &options_.max_error_px,
            "Observations that reproject farther off are dropped in the end, pixels")
+      .Add("max_seconds",
+           &max_seconds_,
+           "Begin no round or iteration later, keep what helped until then; 0 = no limit")
       .Add("min_angle_deg", &options_.min_angle_deg, "Least angle between rays of a point, degrees")
       .Add("refine_focal_length", &options_.refine_focal_length, "Refine focal lengths")
       .Add("refine_principal_point", &options_.refine_principal_point, "Refine principal points")
@@ -37,6 +40,9 @@ void RefineFlags::Declare(Flags& flags) {
            "Standard deviation of pose priors without covariance, metres for GPS, else their unit");
 }
 
-void RefineFlags::ApplyTo(RefineModelOptions& options) const { options = options_; }
+void RefineFlags::ApplyTo(RefineModelOptions& options) const {
+  options = options_;
+  if (max_seconds_ != 0.0) options.max_seconds = max_seconds_;
+}
 
 }  // namespace vgtw

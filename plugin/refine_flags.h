@@ -17,6 +17,7 @@ class RefineFlags {
 
  private:
   RefineModelOptions options_;
+  double max_seconds_ = 0.0;
   PriorOptions priors_;
 };
 

@@ -112,6 +112,7 @@ json AsJson(const RefineModelOptions& options) {
           {"max_turn_deg", options.max_turn_deg},
           {"max_error_px", options.max_error_px},
           {"min_angle_deg", options.min_angle_deg},
+          {"max_seconds", NumberOrNull(options.max_seconds)},
           {"refine_focal_length", options.refine_focal_length},
           {"refine_principal_point", options.refine_principal_point},
           {"refine_extra_params", options.refine_extra_params}};
@@ -124,6 +125,7 @@ json AsJson(const RefineModelResult& result) {
   for (const RefineRound& round : result.rounds) rounds.push_back(AsJson(round));
   return {{"views", views},
           {"rounds", rounds},
+          {"is_out_of_time", result.is_out_of_time},
           {"num_held_out_tracks", result.num_held_out_tracks},
           {"held_out_before_px", NumberOrNull(result.held_out_before_px)},
           {"held_out_after_px", NumberOrNull(result.held_out_after_px)},
@@ -167,6 +169,7 @@ std::string FormatRefinement(const RefineModelResult& result) {
   for (const std::string& note : UnrefinedNotes(AsJson(result).at("views"))) {
     text += "note: " + note + "\n";
   }
+  if (result.is_out_of_time) text += "note: stopped by --max_seconds; more time may refine more\n";
   return text;
 }
 

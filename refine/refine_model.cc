@@ -37,6 +37,8 @@ void RefineModelOptions::Check() const {
   VGTW_CHECK(max_turn_deg > 0.0 && max_turn_deg <= 180.0,
              "RefineModelOptions::max_turn_deg = " + std::to_string(max_turn_deg) +
                  ", must be in (0, 180]");
+  VGTW_CHECK(max_seconds >= 0.0,
+             "RefineModelOptions::max_seconds = " + std::to_string(max_seconds) + ", must be >= 0");
   TriangulationOptions{max_error_px, min_angle_deg, num_threads}.Check();
 }
 

@@ -36,8 +36,10 @@ struct RefineModelOptions {
   // What is known besides pixels. Stated sigmas are where the measured ones start from: residuals
   // give them anew after every adjustment (of up to 1500 poses and intrinsics).
   BundlePriors priors;
+  // No round and no iteration begins later; what helped until then stays.
+  double max_seconds = std::numeric_limits<double>::infinity();
   int num_threads = 0;        // 0 = all cores
-  ProgressCallback progress;  // (rounds done, rounds at most)
+  ProgressCallback progress;  // a hundred for each round, never backwards
 
   void Check() const;
 };
@@ -81,6 +83,7 @@ struct RefineModelResult {
   Reconstruction refined;
   std::map<ImageId, RefinedView> views;
   std::vector<RefineRound> rounds;
+  bool is_out_of_time = false;  // max_seconds were over
   size_t num_held_out_tracks = 0;
   double held_out_before_px = std::numeric_limits<double>::quiet_NaN();
   double held_out_after_px = std::numeric_limits<double>::quiet_NaN();

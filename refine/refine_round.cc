@@ -112,7 +112,8 @@ RoundOutcome RunRefineRound(const RefineModelOptions& options,
                             const std::set<ImageId>& held,
                             const RoundLimits& limits,
                             BundlePriors& priors,
-                            Reconstruction& model) {
+                            Reconstruction& model,
+                            const std::function<bool()>& goes_on) {
   RoundOutcome outcome;
   RoundLimits current = limits;
   // The share that is held out supports a view no less.
@@ -129,6 +130,7 @@ RoundOutcome RunRefineRound(const RefineModelOptions& options,
     // Distortion is released once poses are near: before that it would soak up their errors.
     adjustment.refine_extra_params &= limits.IsFinal() || pass == 1;
     adjustment.function_tolerance = is_fine ? kFineTolerance : kCoarseTolerance;
+    if (goes_on) adjustment.on_iteration = [&](int, double) { return goes_on(); };
     outcome.adjustment = AdjustBundle(adjustment, model);
     if (!outcome.adjustment.success) return {};
     if (HasEntries(priors)) {

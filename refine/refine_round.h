@@ -41,13 +41,15 @@ std::vector<Track> TracksIn(const std::vector<Track>& tracks,
 // poses, the second sharpens them without what the first dropped. Images in `held` and images with
 // too few supporting observations take no part and stay as they are: as fixed cameras their few,
 // often wrong, observations would turn all others around them.
-// The sigmas of `priors` become those that their residuals show.
+// The sigmas of `priors` become those that their residuals show. `goes_on` is asked before every
+// iteration; what was reached when it says no is kept.
 RoundOutcome RunRefineRound(const RefineModelOptions& options,
                             const std::vector<Track>& tracks,
                             const std::set<ImageId>& held,
                             const RoundLimits& limits,
                             BundlePriors& priors,
-                            Reconstruction& model);
+                            Reconstruction& model,
+                            const std::function<bool()>& goes_on = {});
 
 // How the model is adjusted: robustly at the scale of the error that it has.
 BundleAdjustmentOptions AdjustmentOf(const RefineModelOptions& options,

@@ -24,6 +24,7 @@ constexpr double kWorseSigmas = 2.0;
 constexpr double kMaxGrowth = 1.25;
 // Views turn alike if they turn by less than so many medians.
 constexpr double kMaxMedianTurns = 4.0;
+constexpr int kIterationsPerRound = 100;  // at most, two adjustments of 50; repeats are not counted
 // So often is a round repeated without views that it left worse.
 constexpr int kMaxRepeats = 3;
 // Mean errors held out are alike if they differ by less than the first share, or by less than the
@@ -177,8 +178,9 @@ std::optional<Judged> Refinement::Attempt(const RefineModelOptions& options,
                                           const RoundLimits& limits,
                                           const std::set<ImageId>& held,
                                           BundlePriors& priors,
-                                          RoundOutcome& outcome) const {
-  outcome = RunRefineRound(options, split_.adjusted, held, limits, priors, model);
+                                          RoundOutcome& outcome) {
+  outcome = RunRefineRound(
+      options, split_.adjusted, held, limits, priors, model, [this] { return GoesOn(); });
   if (outcome.adjusted.empty()) return std::nullopt;
   std::set<ImageId> still;
   for (const auto& [id, image] : model.images) {
@@ -187,6 +189,21 @@ std::optional<Judged> Refinement::Attempt(const RefineModelOptions& options,
   Transform(AlignPoses(model, good_.model, still), model);
   PutBack(still, good_.model, model);
   return Judge(std::move(model));
+}
+
+bool Refinement::IsLate() const {
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start_time_;
+  return seconds.count() >= options_.max_seconds;
+}
+
+bool Refinement::GoesOn() {
+  if (options_.progress) {
+    num_iterations_of_round_ = std::min(num_iterations_of_round_ + 1, kIterationsPerRound - 1);
+    const int64_t total = int64_t{options_.max_num_rounds} * kIterationsPerRound;
+    const int64_t done = static_cast<int64_t>(rounds_.size()) * kIterationsPerRound;
+    options_.progress(std::min(done + num_iterations_of_round_, total - 1), total);
+  }
+  return !IsLate();
 }
 
 bool Refinement::IsAsGood(const Judged& candidate) const {
@@ -202,7 +219,8 @@ bool Refinement::RunRound(RoundLimits& limits) {
   RoundOutcome outcome;
   BundlePriors priors;
   std::optional<Judged> candidate;
-  for (int i = 0; i <= kMaxRepeats; ++i) {
+  num_iterations_of_round_ = 0;
+  for (int i = 0;; ++i) {
     priors = priors_;
     candidate = Attempt(options_, good_.model, limits, excluded.held, priors, outcome);
     if (!candidate || !Exclude(*candidate, outcome, excluded)) break;
@@ -210,9 +228,10 @@ bool Refinement::RunRound(RoundLimits& limits) {
       candidate.reset();  // no round that a minority could save
       break;
     }
-    if (i < kMaxRepeats) continue;
+    if (i < kMaxRepeats && !IsLate()) continue;
     PutBack(excluded.held, good_.model, candidate->model);
     candidate = Judge(std::move(candidate->model));
+    break;
   }
   for (const ImageId id : excluded.held) round.put_back.push_back(seed_.images.at(id).name);
   if (candidate) {
@@ -322,14 +341,14 @@ RefineModelResult Refinement::Run() {
   result.num_held_out_tracks = split_.held_out.size();
   result.held_out_before_px = start_px_;
   RoundLimits limits = first_limits_;
-  for (int i = 0; i < options_.max_num_rounds; ++i) {
+  for (int i = 0; i < options_.max_num_rounds && !IsLate(); ++i) {
     const RoundLimits before_round = limits;
     const bool has_gained = RunRound(limits);
-    if (options_.progress) options_.progress(i + 1, options_.max_num_rounds);
     // The same again would come of the same limits and poses.
     if (!has_gained && limits == before_round) break;
   }
-  TryFewerIntrinsics(limits);
+  if (!IsLate()) TryFewerIntrinsics(limits);
+  result.is_out_of_time = IsLate();
   result.feedforward = TriangulateAll(seed_, first_limits_.max_error_px);
   result.refined = PutBackUnsupported();
   if (good_.mean_px > start_px_) {
@@ -340,6 +359,7 @@ RefineModelResult Refinement::Run() {
   result.held_out_after_px = good_.mean_px;
   DescribeViews(result);
   if (result.IsRefined()) AddUncertainty(result);
+  if (options_.progress) options_.progress(1, 1);
   return result;
 }
 

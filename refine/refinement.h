@@ -5,6 +5,7 @@
 #include "refine/refine_model.h"
 #include "refine/refine_round.h"
 
+#include <chrono>
 #include <map>
 #include <optional>
 #include <set>
@@ -47,7 +48,10 @@ class Refinement {
                                 const RoundLimits& limits,
                                 const std::set<ImageId>& held,
                                 BundlePriors& priors,
-                                RoundOutcome& outcome) const;
+                                RoundOutcome& outcome);
+  // Reports an iteration; whether there is time for it.
+  bool GoesOn();
+  bool IsLate() const;
   bool IsAsGood(const Judged& candidate) const;
   // Where the observations hardly determine the intrinsics, these take up noise and the poses with
   // them: those of the seed stay unless what is held out asks for others.
@@ -73,6 +77,7 @@ class Refinement {
   Reconstruction TriangulateAll(const Reconstruction& poses,
                                 const std::map<ImageId, double>& max_error_px = {}) const;
 
+  const std::chrono::steady_clock::time_point start_time_ = std::chrono::steady_clock::now();
   const RefineModelOptions& options_;
   const Reconstruction& seed_;
   const std::vector<Track>& tracks_;
@@ -85,6 +90,7 @@ class Refinement {
   const double start_px_;
   std::map<ImageId, std::string> rejected_;  // and why
   std::vector<RefineRound> rounds_;
+  int num_iterations_of_round_ = 0;
 };
 
 }  // namespace vgtw

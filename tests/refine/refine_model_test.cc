@@ -7,9 +7,11 @@
 #include "tests/support/synthetic_model.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -172,11 +174,15 @@ TEST(RefineModel, DescribesWhatItDid) {
   const std::vector<Track> tracks = TracksOf(truth);
   RefineModelOptions options;
   options.held_out_percent = 20.0;
-  std::vector<int64_t> rounds_done;
-  options.progress = [&](int64_t done, int64_t) { rounds_done.push_back(done); };
+  std::vector<double> shares_done;
+  options.progress = [&](int64_t done, int64_t total) {
+    shares_done.push_back(static_cast<double>(done) / static_cast<double>(total));
+  };
   const RefineModelResult result = RefineModel(options, seed, tracks);
-  EXPECT_EQ(rounds_done.size(), result.rounds.size());
-  EXPECT_EQ(rounds_done.back(), static_cast<int64_t>(result.rounds.size()));
+  EXPECT_GT(shares_done.size(), 2 * result.rounds.size());
+  EXPECT_TRUE(std::is_sorted(shares_done.begin(), shares_done.end()));
+  EXPECT_EQ(shares_done.back(), 1.0);
+  EXPECT_FALSE(result.is_out_of_time);
   EXPECT_NEAR(static_cast<double>(result.num_held_out_tracks), 50.0, 25.0);
   EXPECT_EQ(FindFault(result.feedforward), "");
   EXPECT_EQ(FindFault(result.refined), "");
@@ -193,6 +199,31 @@ TEST(RefineModel, DescribesWhatItDid) {
     EXPECT_DOUBLE_EQ(view.turn_deg, AngleBetweenDeg(seed_pose.rotation, pose.rotation));
     EXPECT_DOUBLE_EQ(view.move, (OriginInSource(seed_pose) - OriginInSource(pose)).norm());
   }
+}
+
+TEST(RefineModel, StopsInTimeWithWhatHelped) {
+  const Reconstruction truth = MakeSyntheticModel(Scene());
+  Reconstruction seed = truth;
+  Perturb(1.0, 2, seed);
+  RefineModelOptions options;
+  options.max_seconds = 0.0;
+  const RefineModelResult none = RefineModel(options, seed, TracksOf(truth));
+  EXPECT_TRUE(none.is_out_of_time);
+  EXPECT_TRUE(none.rounds.empty());
+  EXPECT_FALSE(none.IsRefined());
+  EXPECT_TRUE(
+      AreBitEqual(none.refined.images.at(2).cam_from_world, seed.images.at(2).cam_from_world));
+  // Over in the midst of the first adjustment, as soon as it has begun.
+  const auto start = std::chrono::steady_clock::now();
+  options.max_seconds = 2.0;
+  int num_iterations = 0;
+  options.progress = [&](int64_t, int64_t) {
+    if (++num_iterations == 3) std::this_thread::sleep_until(start + std::chrono::seconds(2));
+  };
+  const RefineModelResult some = RefineModel(options, seed, TracksOf(truth));
+  EXPECT_TRUE(some.is_out_of_time);
+  EXPECT_EQ(some.rounds.size(), 1u);
+  EXPECT_LT(some.held_out_after_px, some.held_out_before_px);
 }
 
 TEST(RefineModel, KeepsAViewOfFewObservations) {
