@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evaluation/pose_error.h"
 
+#include "scene/error.h"
 #include "scene/statistics.h"
 
 #include <cmath>
-#include <numbers>
+#include <limits>
 #include <utility>
 
 #include <Eigen/Core>
@@ -12,117 +13,123 @@
 namespace vgtw {
 namespace {
 
-// Share of the extent below which two centres give no direction.
-constexpr double kMinRelativeBaseline = 1e-9;
+constexpr size_t kMinViews = 2;  // for a pair
 
-std::vector<Eigen::Vector3d> Centres(const std::vector<Rigid3d>& cams_from_world) {
-  std::vector<Eigen::Vector3d> centres;
-  centres.reserve(cams_from_world.size());
-  for (const Rigid3d& cam_from_world : cams_from_world) {
-    centres.push_back(OriginInSource(cam_from_world));
-  }
-  return centres;
+double MedianOrNan(std::vector<double> values) {
+  return values.empty() ? std::numeric_limits<double>::quiet_NaN() : Median(std::move(values));
 }
 
-double AngleBetweenDirectionsDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / std::numbers::pi;
-}
+struct CommonViews {
+  std::vector<std::string> names;
+  std::vector<Rigid3d> estimate;
+  std::vector<Rigid3d> reference;
+  std::vector<std::string> missing;
+};
 
-// Fills relative_rotation_deg of every view; returns the median over all pairs.
-double MedianRelativeRotationDeg(const std::vector<Rigid3d>& estimate,
-                                 const std::vector<Rigid3d>& reference,
-                                 std::vector<ViewPoseError>& views) {
-  std::vector<double> errors_deg;
-  errors_deg.reserve(estimate.size() * (estimate.size() - 1) / 2);
-  std::vector<std::vector<double>> errors_deg_by_view(views.size());
-  for (size_t i = 0; i < estimate.size(); ++i) {
-    for (size_t j = i + 1; j < estimate.size(); ++j) {
-      const double error_deg =
-          AngleBetweenDeg(estimate[j].rotation * estimate[i].rotation.conjugate(),
-                          reference[j].rotation * reference[i].rotation.conjugate());
-      errors_deg.push_back(error_deg);
-      errors_deg_by_view[i].push_back(error_deg);
-      errors_deg_by_view[j].push_back(error_deg);
-    }
+CommonViews FindCommonViews(const std::vector<NamedPose>& estimate,
+                            const std::vector<NamedPose>& reference) {
+  std::map<std::string, const Rigid3d*> estimate_by_name;
+  for (const NamedPose& pose : estimate) {
+    const bool is_new = estimate_by_name.emplace(pose.name, &pose.cam_from_world).second;
+    VGTW_CHECK(is_new, "names are unique: " + pose.name);
   }
-  for (size_t i = 0; i < views.size(); ++i) {
-    views[i].relative_rotation_deg = Median(std::move(errors_deg_by_view[i]));
-  }
-  return Median(std::move(errors_deg));
-}
-
-// The direction to camera 2 in camera 1's frame does not depend on the world.
-double MedianRelativeDirectionDeg(const std::vector<Rigid3d>& estimate,
-                                  const std::vector<Rigid3d>& reference,
-                                  double estimate_extent,
-                                  double reference_extent) {
-  const std::vector<Eigen::Vector3d> estimate_centres = Centres(estimate);
-  const std::vector<Eigen::Vector3d> reference_centres = Centres(reference);
-  std::vector<double> errors_deg;
-  errors_deg.reserve(estimate.size() * (estimate.size() - 1) / 2);
-  for (size_t i = 0; i < estimate.size(); ++i) {
-    for (size_t j = i + 1; j < estimate.size(); ++j) {
-      const Eigen::Vector3d estimated = estimate_centres[j] - estimate_centres[i];
-      const Eigen::Vector3d expected = reference_centres[j] - reference_centres[i];
-      if (estimated.norm() < kMinRelativeBaseline * estimate_extent ||
-          expected.norm() < kMinRelativeBaseline * reference_extent) {
-        continue;
-      }
-      errors_deg.push_back(AngleBetweenDirectionsDeg(estimate[i].rotation * estimated,
-                                                     reference[i].rotation * expected));
-    }
-  }
-  return Median(std::move(errors_deg));  // not empty: the centres are not all the same
-}
-
-}  // namespace
-
-std::optional<PoseComparison> ComparePoses(const std::map<std::string, Rigid3d>& estimate,
-                                           const std::map<std::string, Rigid3d>& reference) {
-  PoseComparison comparison;
-  std::vector<Rigid3d> estimated;
-  std::vector<Rigid3d> expected;
-  std::vector<Eigen::Vector3d> all_reference_centres;
-  for (const auto& [name, cam_from_reference] : reference) {
-    all_reference_centres.push_back(OriginInSource(cam_from_reference));
-    const auto found = estimate.find(name);
-    if (found == estimate.end()) {
-      ++comparison.num_missing;
+  CommonViews common;
+  for (const NamedPose& pose : reference) {
+    const auto found = estimate_by_name.find(pose.name);
+    if (found == estimate_by_name.end()) {
+      common.missing.push_back(pose.name);
       continue;
     }
-    comparison.views.push_back({.name = name});
-    estimated.push_back(found->second);
-    expected.push_back(cam_from_reference);
+    common.names.push_back(pose.name);
+    common.estimate.push_back(*found->second);
+    common.reference.push_back(pose.cam_from_world);
   }
+  return common;
+}
 
-  const std::vector<Eigen::Vector3d> estimated_centres = Centres(estimated);
-  const std::vector<Eigen::Vector3d> expected_centres = Centres(expected);
-  const std::optional<Sim3d> alignment = EstimateSim3d(estimated_centres, expected_centres);
-  if (!alignment) return std::nullopt;
-  comparison.reference_from_estimate = *alignment;
-  comparison.extent = Diameter(all_reference_centres);
-
+void CompareAlignedViews(const CommonViews& common,
+                         const AlignedPoses& aligned,
+                         PoseComparison& comparison) {
   double sum_squared = 0.0;
   std::vector<double> rotations_deg;
-  for (size_t i = 0; i < comparison.views.size(); ++i) {
-    ViewPoseError& view = comparison.views[i];
+  for (size_t i = 0; i < common.names.size(); ++i) {
+    ViewPoseError view;
+    view.name = common.names[i];
+    view.is_inlier = aligned.is_inlier[i];
+    view.estimated_cam_from_world =
+        TransformCamera(aligned.reference_from_estimate, common.estimate[i]);
+    view.expected_cam_from_world = common.reference[i];
     view.rotation_deg =
-        AngleBetweenDeg(TransformCamera(*alignment, estimated[i]).rotation, expected[i].rotation);
-    view.centre = (*alignment * estimated_centres[i] - expected_centres[i]).norm();
+        AngleBetweenDeg(view.estimated_cam_from_world.rotation, common.reference[i].rotation);
+    view.centre = (aligned.reference_from_estimate * OriginInSource(common.estimate[i]) -
+                   OriginInSource(common.reference[i]))
+                      .norm();
     sum_squared += view.centre * view.centre;
     rotations_deg.push_back(view.rotation_deg);
     comparison.rotation_mean_deg += view.rotation_deg;
+    comparison.views.push_back(std::move(view));
   }
-  const auto num_views = static_cast<double>(comparison.views.size());
+  const auto num_views = static_cast<double>(common.names.size());
   comparison.centre_rmse = std::sqrt(sum_squared / num_views);
   comparison.centre_rmse_percent = 100.0 * comparison.centre_rmse / comparison.extent;
   comparison.rotation_mean_deg /= num_views;
   comparison.rotation_median_deg = Median(std::move(rotations_deg));
-  comparison.relative_rotation_median_deg =
-      MedianRelativeRotationDeg(estimated, expected, comparison.views);
-  comparison.relative_direction_median_deg = MedianRelativeDirectionDeg(
-      estimated, expected, Diameter(estimated_centres), comparison.extent);
+}
+
+void SummarisePairs(PoseComparison& comparison) {
+  std::vector<double> rotations_deg;
+  std::vector<double> directions_deg;
+  std::vector<std::vector<double>> rotations_deg_by_view(comparison.views.size());
+  for (const PairError& pair : comparison.pairs) {
+    rotations_deg.push_back(pair.rotation_deg);
+    rotations_deg_by_view[pair.view1].push_back(pair.rotation_deg);
+    rotations_deg_by_view[pair.view2].push_back(pair.rotation_deg);
+    if (!std::isnan(pair.direction_deg)) directions_deg.push_back(pair.direction_deg);
+  }
+  for (size_t i = 0; i < comparison.views.size(); ++i) {
+    comparison.views[i].relative_rotation_deg = Median(std::move(rotations_deg_by_view[i]));
+  }
+  comparison.relative_rotation_median_deg = Median(std::move(rotations_deg));
+  comparison.relative_direction_median_deg = MedianOrNan(std::move(directions_deg));
+}
+
+std::vector<NamedPose> InOrderOfNames(
+    const std::map<std::string, Rigid3d>& cam_from_world_by_name) {
+  std::vector<NamedPose> poses;
+  for (const auto& [name, cam_from_world] : cam_from_world_by_name) {
+    poses.push_back({name, cam_from_world});
+  }
+  return poses;
+}
+
+}  // namespace
+
+std::optional<PoseComparison> ComparePoses(const std::vector<NamedPose>& estimate,
+                                           const std::vector<NamedPose>& reference,
+                                           const PoseAlignmentOptions& alignment) {
+  CommonViews common = FindCommonViews(estimate, reference);
+  if (common.names.size() < kMinViews) return std::nullopt;
+  const std::optional<AlignedPoses> aligned =
+      AlignPoses(common.estimate, common.reference, alignment);
+  if (!aligned) return std::nullopt;
+
+  PoseComparison comparison;
+  comparison.alignment = alignment;
+  comparison.reference_from_estimate = aligned->reference_from_estimate;
+  std::vector<Rigid3d> all_expected;
+  for (const NamedPose& pose : reference) all_expected.push_back(pose.cam_from_world);
+  comparison.extent = Diameter(CameraCentres(all_expected));
+  CompareAlignedViews(common, *aligned, comparison);
+  comparison.pairs = ComputePairErrors(common.estimate, common.reference);
+  SummarisePairs(comparison);
+  comparison.missing = std::move(common.missing);
   return comparison;
+}
+
+std::optional<PoseComparison> ComparePoses(const std::map<std::string, Rigid3d>& estimate,
+                                           const std::map<std::string, Rigid3d>& reference,
+                                           const PoseAlignmentOptions& alignment) {
+  return ComparePoses(InOrderOfNames(estimate), InOrderOfNames(reference), alignment);
 }
 
 }  // namespace vgtw

@@ -121,7 +121,7 @@ json AsJson(const PoseComparison& comparison) {
                      {"centre", view.centre}});
   }
   return {{"alignment", "Sim3 on camera centres"},
-          {"num_missing", comparison.num_missing},
+          {"num_missing", comparison.missing.size()},
           {"extent", comparison.extent},
           {"centre_rmse", comparison.centre_rmse},
           {"centre_rmse_percent", comparison.centre_rmse_percent},

@@ -63,6 +63,7 @@ Moments ComputeMoments(const Points& points_in_a,
 template <typename WeightOf>
 std::optional<Sim3d> Estimate(const Points& points_in_a,
                               const Points& points_in_b,
+                              bool fixed_scale,
                               const WeightOf& weight_of) {
   size_t num_weighted = 0;
   for (size_t i = 0; i < points_in_a.size(); ++i) num_weighted += weight_of(i) > 0.0;
@@ -78,7 +79,8 @@ std::optional<Sim3d> Estimate(const Points& points_in_a,
   const Eigen::Matrix3d rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
   Sim3d b_from_a;
   b_from_a.rotation = Eigen::Quaterniond(rotation).normalized();
-  b_from_a.scale = svd.singularValues().dot(signs) / moments.variance_a;
+  // The best rotation is the same for every scale.
+  b_from_a.scale = fixed_scale ? 1.0 : svd.singularValues().dot(signs) / moments.variance_a;
   if (!std::isnormal(b_from_a.scale) || b_from_a.scale < 0.0) return std::nullopt;
   b_from_a.translation = moments.mean_b - b_from_a.scale * (b_from_a.rotation * moments.mean_a);
   return b_from_a;
@@ -86,8 +88,10 @@ std::optional<Sim3d> Estimate(const Points& points_in_a,
 
 std::optional<Sim3d> EstimateFrom(const Points& points_in_a,
                                   const Points& points_in_b,
+                                  bool fixed_scale,
                                   const std::vector<bool>& is_inlier) {
-  return Estimate(points_in_a, points_in_b, [&](size_t i) { return is_inlier[i] ? 1.0 : 0.0; });
+  return Estimate(
+      points_in_a, points_in_b, fixed_scale, [&](size_t i) { return is_inlier[i] ? 1.0 : 0.0; });
 }
 
 // Calls visit(indices) for every sample of three, or for `max_samples` random ones if there are
@@ -180,15 +184,17 @@ Rigid3d TransformCamera(const Sim3d& b_from_a, const Rigid3d& cam_from_a) {
 
 std::optional<Sim3d> EstimateSim3d(const Points& points_in_a,
                                    const Points& points_in_b,
-                                   const std::vector<double>& weights) {
+                                   const std::vector<double>& weights,
+                                   bool fixed_scale) {
   CheckPairs(points_in_a, points_in_b);
   VGTW_CHECK(weights.empty() || weights.size() == points_in_a.size(), "one weight per pair");
   VGTW_CHECK(std::all_of(weights.begin(),
                          weights.end(),
                          [](double weight) { return std::isfinite(weight) && weight >= 0.0; }),
              "weights are finite and not negative");
-  return Estimate(
-      points_in_a, points_in_b, [&](size_t i) { return weights.empty() ? 1.0 : weights[i]; });
+  return Estimate(points_in_a, points_in_b, fixed_scale, [&](size_t i) {
+    return weights.empty() ? 1.0 : weights[i];
+  });
 }
 
 void RobustSim3dOptions::Check() const {
@@ -213,7 +219,9 @@ std::optional<RobustSim3d> EstimateSim3dRobust(const Points& points_in_a,
   ForEachSample(n, static_cast<size_t>(options.max_iterations), options.seed, [&](const auto& idx) {
     const std::optional<Sim3d> b_from_a =
         EstimateSim3d({points_in_a[idx[0]], points_in_a[idx[1]], points_in_a[idx[2]]},
-                      {points_in_b[idx[0]], points_in_b[idx[1]], points_in_b[idx[2]]});
+                      {points_in_b[idx[0]], points_in_b[idx[1]], points_in_b[idx[2]]},
+                      /*weights=*/{},
+                      options.fixed_scale);
     if (!b_from_a) return;
     ComputeResiduals(*b_from_a, points_in_a, points_in_b, residuals);
     const double cost = Cost(residuals, options.max_residual);
@@ -230,7 +238,8 @@ std::optional<RobustSim3d> EstimateSim3dRobust(const Points& points_in_a,
     ComputeResiduals(best.b_from_a, points_in_a, points_in_b, residuals);
     std::vector<bool> is_inlier = FindInliers(residuals, best.max_residual);
     if (is_inlier == best.is_inlier) break;
-    const std::optional<Sim3d> b_from_a = EstimateFrom(points_in_a, points_in_b, is_inlier);
+    const std::optional<Sim3d> b_from_a =
+        EstimateFrom(points_in_a, points_in_b, options.fixed_scale, is_inlier);
     if (!b_from_a) return std::nullopt;
     best.b_from_a = *b_from_a;
     best.is_inlier = std::move(is_inlier);

@@ -33,19 +33,22 @@ Sim3d Inverse(const Sim3d& b_from_a);
 Rigid3d TransformCamera(const Sim3d& b_from_a, const Rigid3d& cam_from_a);
 
 // Minimises  sum_i w_i |points_in_b[i] - b_from_a * points_in_a[i]|^2  in closed form; weights may
-// be empty (all 1). Returns nullopt if fewer than 3 points have weight or if they are collinear
-// (rank of the covariance < 2), where the rotation is undetermined.
+// be empty (all 1). With `fixed_scale` among the rigid motions, of scale 1.
+// Returns nullopt if fewer than 3 points have weight or if they are collinear (rank of the
+// covariance < 2), where the rotation is undetermined.
 // Source: S. Umeyama, Least-squares estimation of transformation parameters between two point
 // patterns, PAMI 1991; weights as in the weighted mean and covariance.
 std::optional<Sim3d> EstimateSim3d(const std::vector<Eigen::Vector3d>& points_in_a,
                                    const std::vector<Eigen::Vector3d>& points_in_b,
-                                   const std::vector<double>& weights = {});
+                                   const std::vector<double>& weights = {},
+                                   bool fixed_scale = false);
 
 struct RobustSim3dOptions {
   // Distance in b (scene units) under which a pair is an inlier. 0 = taken from the data: 2.5 times
   // the scaled median absolute residual of the best hypothesis (least median of squares).
   double max_residual = 0.0;
   int max_iterations = 1000;
+  bool fixed_scale = false;  // only rigid motions
   uint64_t seed = 0;
 
   void Check() const;

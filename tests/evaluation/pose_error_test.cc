@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evaluation/pose_error.h"
 
+#include "tests/evaluation/golden_cases.h"
+
 #include <cmath>
 #include <map>
 #include <random>
@@ -55,7 +57,7 @@ TEST(ComparePoses, EqualPosesHaveNoError) {
   EXPECT_LT(comparison->rotation_mean_deg, 1e-12);
   EXPECT_LT(comparison->relative_rotation_median_deg, 1e-12);
   EXPECT_LT(comparison->relative_direction_median_deg, 1e-12);
-  EXPECT_EQ(comparison->num_missing, 0u);
+  EXPECT_TRUE(comparison->missing.empty());
   EXPECT_EQ(comparison->views.size(), 6u);
   EXPECT_EQ(comparison->views.front().name, "view0");
 }
@@ -132,7 +134,7 @@ TEST(ComparePoses, CountsViewsThatTheEstimateLacks) {
   estimate["elsewhere"] = Rigid3d();
   const auto comparison = ComparePoses(estimate, reference);
   ASSERT_TRUE(comparison);
-  EXPECT_EQ(comparison->num_missing, 2u);
+  EXPECT_EQ(comparison->missing, (std::vector<std::string>{"view2", "view5"}));
   ASSERT_EQ(comparison->views.size(), 4u);
   EXPECT_EQ(comparison->views[2].name, "view3");
   EXPECT_EQ(comparison->extent, ComparePoses(reference, reference)->extent);
@@ -177,6 +179,70 @@ TEST(ComparePoses, TurningOneViewShowsInItsRelativeRotationOnly) {
     // Every other view has one bad pair of six: the median does not see it.
     EXPECT_NEAR(view.relative_rotation_deg, view.name == "view2" ? 5.0 : 0.0, 1e-9) << view.name;
   }
+}
+
+TEST(ComparePoses, ErrorsOfViewsAgreeWithSciPy) {
+  const nlohmann::json trajectories = ReadGolden("evo_trajectories")["cases"];
+  for (const auto& [name, golden] : ReadGolden("pair_accuracy")["cases"].items()) {
+    const auto comparison = ComparePoses(PosesOf(trajectories[name]["estimate"]),
+                                         PosesOf(trajectories[name]["reference"]));
+    ASSERT_TRUE(comparison);
+    const nlohmann::json& expected = golden["views"];
+    EXPECT_NEAR(comparison->reference_from_estimate.scale, expected["scale"], 1e-9);
+    for (size_t i = 0; i < comparison->views.size(); ++i) {
+      EXPECT_NEAR(comparison->views[i].centre, expected["centre"][i], 1e-9) << name;
+      EXPECT_NEAR(comparison->views[i].rotation_deg, expected["rotation_deg"][i], 1e-9) << name;
+    }
+  }
+}
+
+TEST(ComparePoses, RigidMotionsOfTheEstimateChangeNothingUnlessUnaligned) {
+  const Poses reference = RandomPoses(8, 5);
+  const Poses estimate = RandomPoses(8, 6);
+  const Sim3d rigid = {1.0, RotationAboutAxis({0, 0.6, 0.8}, 77.0), {5.0, -2.0, 11.0}};
+  for (const PoseAlignment type :
+       {PoseAlignment::kNone, PoseAlignment::kFirstCamera, PoseAlignment::kSE3}) {
+    const auto before = ComparePoses(estimate, reference, {.type = type});
+    const auto after = ComparePoses(Moved(rigid, estimate), reference, {.type = type});
+    ASSERT_TRUE(before && after);
+    const bool is_aligned = type != PoseAlignment::kNone;
+    const double change = std::abs(after->centre_rmse - before->centre_rmse);
+    EXPECT_TRUE(is_aligned ? change < 1e-11 : change > 1.0) << change;
+  }
+}
+
+TEST(ComparePoses, FirstCameraOfTheReferencesOrderIsExact) {
+  std::vector<NamedPose> reference;
+  for (const auto& [name, pose] : RandomPoses(5, 7)) reference.push_back({name, pose});
+  std::swap(reference[0], reference[3]);
+  std::vector<NamedPose> estimate;
+  for (const auto& [name, pose] : RandomPoses(5, 8)) estimate.push_back({name, pose});
+  const auto comparison = ComparePoses(estimate, reference, {.type = PoseAlignment::kFirstCamera});
+  ASSERT_TRUE(comparison);
+  EXPECT_EQ(comparison->views[0].name, "view3");
+  EXPECT_LT(comparison->views[0].centre, 1e-13);
+  EXPECT_LT(comparison->views[0].rotation_deg, 1e-12);
+  EXPECT_GT(comparison->views[1].centre, 0.1);
+}
+
+TEST(ComparePoses, RobustAlignmentLeavesErrorsToTheOutliers) {
+  const Poses reference = RandomPoses(20, 9);
+  Poses estimate = reference;
+  for (const char* name : {"view2", "view5", "view7", "view11", "view13", "view19"}) {
+    estimate[name].translation += Eigen::Vector3d(20, -30, 10);
+  }
+  const auto comparison = ComparePoses(estimate, reference, {.robust = true});
+  ASSERT_TRUE(comparison);
+  for (const ViewPoseError& view : comparison->views) {
+    const bool is_moved = estimate[view.name].translation != reference.at(view.name).translation;
+    EXPECT_EQ(view.is_inlier, !is_moved) << view.name;
+    EXPECT_NEAR(view.centre, is_moved ? std::sqrt(1400.0) : 0.0, 1e-9) << view.name;
+  }
+}
+
+TEST(ComparePoses, NamesAreUnique) {
+  const std::vector<NamedPose> twice = {{"a", {}}, {"a", {}}};
+  EXPECT_THROW(ComparePoses(twice, twice), std::invalid_argument);
 }
 
 }  // namespace

@@ -217,6 +217,24 @@ TEST(EstimateSim3dRobust, EqualsTheEstimateFromTheTrueInliersUnderNoise) {
   EXPECT_LT(robust->max_residual, 0.1);
 }
 
+TEST(EstimateSim3d, OfFixedScaleIsTheBestRigidMotion) {
+  const Points points_in_a = RandomPoints(10);
+  const Sim3d rigid = {1.0, RandomSim3d().rotation, {1.0, 2.0, 3.0}};
+  ExpectNear(
+      *EstimateSim3d(points_in_a, Transformed(rigid, points_in_a), {}, true), rigid, kRounding);
+  // Of a scaled copy the rotation and the centroid are met.
+  Sim3d scaled = rigid;
+  scaled.scale = 3.0;
+  const Points points_in_b = Transformed(scaled, points_in_a);
+  const auto best = EstimateSim3d(points_in_a, points_in_b, {}, true);
+  ASSERT_TRUE(best);
+  EXPECT_EQ(best->scale, 1.0);
+  EXPECT_LT(AngleBetweenDeg(best->rotation, rigid.rotation), 60.0 * kRounding);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (size_t i = 0; i < points_in_a.size(); ++i) sum += points_in_b[i] - *best * points_in_a[i];
+  EXPECT_LT(sum.norm(), 10.0 * kRounding);
+}
+
 TEST(EstimateSim3dRobust, IsDeterministicBySeed) {
   const Pairs pairs = MakePairs(40, 10, 0.05);
   const RobustSim3dOptions options = {.max_iterations = 50, .seed = 7};
