@@ -11,11 +11,13 @@ DistractorCount CountOnDistractors(const Reconstruction& reconstruction,
   std::set<Point3DId> points3D;
   for (const auto& [id, image] : reconstruction.images) {
     const StaticMask mask = true_mask(image.name);
+    size_t& num_observations = count.num_observations_by_image[id];
     for (const Point2D& point2D : image.points2D) {
       if (!point2D.HasPoint3D() || !IsExcluded(mask, point2D.xy.x(), point2D.xy.y())) continue;
-      ++count.num_observations;
+      ++num_observations;
       points3D.insert(point2D.point3D_id);
     }
+    count.num_observations += num_observations;
   }
   count.num_points3D = points3D.size();
   return count;

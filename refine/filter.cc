@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "refine/filter.h"
 
-#include "refine/ray_point.h"
 #include "scene/error.h"
 #include "scene/reprojection.h"
+#include "scene/triangulation_angle.h"
 
 #include <optional>
 #include <string>

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
@@ -105,29 +104,6 @@ std::optional<PixelRay> MakePixelRay(const Camera& camera,
 double ErrorPx(const PixelRay& ray, const Eigen::Vector3d& point) {
   const auto error = TangentError(ray, point);
   return error ? error->norm() : kInfinity;
-}
-
-double TriangulationAngleDeg(std::span<const Eigen::Vector3d> centres,
-                             const Eigen::Vector3d& point,
-                             double enough_deg) {
-  double largest_rad = 0.0;
-  const double enough_rad = enough_deg * std::numbers::pi / 180.0;
-  for (size_t i = 0; i < centres.size(); ++i) {
-    const Eigen::Vector3d a = point - centres[i];
-    for (size_t k = 0; k < i; ++k) {
-      const Eigen::Vector3d b = point - centres[k];
-      largest_rad = std::max(largest_rad, std::atan2(a.cross(b).norm(), a.dot(b)));
-      if (largest_rad >= enough_rad) return enough_deg;
-    }
-  }
-  return largest_rad * 180.0 / std::numbers::pi;
-}
-
-double TriangulationAngleDeg(Rays rays, const Eigen::Vector3d& point, double enough_deg) {
-  std::vector<Eigen::Vector3d> centres;
-  centres.reserve(rays.size());
-  for (const PixelRay* ray : rays) centres.push_back(ray->centre);
-  return TriangulationAngleDeg(centres, point, enough_deg);
 }
 
 std::optional<Eigen::Vector3d> EstimateRayPoint(Rays rays,

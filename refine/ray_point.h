@@ -30,15 +30,6 @@ std::optional<PixelRay> MakePixelRay(const Camera& camera,
 // Reprojection error in pixels; infinite if the point is not in front.
 double ErrorPx(const PixelRay& ray, const Eigen::Vector3d& point);
 
-// Largest angle (degrees) at which two of the centres see the point; at most `enough_deg` is told
-// apart.
-double TriangulationAngleDeg(std::span<const Eigen::Vector3d> centres,
-                             const Eigen::Vector3d& point,
-                             double enough_deg = 180.0);
-double TriangulationAngleDeg(std::span<const PixelRay* const> rays,
-                             const Eigen::Vector3d& point,
-                             double enough_deg = 180.0);
-
 // Minimises  sum_i log(1 + (error_i / scale_px)^2)  from the best of what pairs of rays, all rays
 // together and `start` say: wrong rays hardly count. nullopt if no hypothesis lies in front of two
 // rays.

@@ -5,6 +5,7 @@
 #include "scene/error.h"
 #include "scene/parallel.h"
 #include "scene/reprojection.h"
+#include "scene/triangulation_angle.h"
 
 #include <algorithm>
 #include <optional>
@@ -93,6 +94,13 @@ std::vector<TrackRay> TakeInliers(const Eigen::Vector3d& xyz, std::vector<TrackR
   return inliers;
 }
 
+double AngleDeg(const std::vector<TrackRay>& rays, const Eigen::Vector3d& xyz, double enough_deg) {
+  std::vector<Eigen::Vector3d> centres;
+  centres.reserve(rays.size());
+  for (const TrackRay& ray : rays) centres.push_back(ray.ray.centre);
+  return TriangulationAngleDeg(centres, xyz, enough_deg);
+}
+
 std::vector<Point3D> TriangulateTrack(const TriangulationOptions& options,
                                       const Reconstruction& model,
                                       const Track& track) {
@@ -107,10 +115,7 @@ std::vector<Point3D> TriangulateTrack(const TriangulationOptions& options,
     const std::vector<TrackRay> inliers = TakeInliers(*xyz, rays);
     if (inliers.size() < 2) break;
     start.reset();
-    if (TriangulationAngleDeg(Pointers(inliers), *xyz, options.min_angle_deg) <
-        options.min_angle_deg) {
-      continue;
-    }
+    if (AngleDeg(inliers, *xyz, options.min_angle_deg) < options.min_angle_deg) continue;
     Point3D point;
     point.xyz = *xyz;
     if (old) point.rgb = old->rgb;

@@ -40,6 +40,7 @@ TEST(CountOnDistractors, CountsPointsWithAnObservationInExcludedPixels) {
   const DistractorCount count = CountOnDistractors(MakeModel(), MaskOf);
   EXPECT_EQ(count.num_observations, 2u);
   EXPECT_EQ(count.num_points3D, 2u);
+  EXPECT_EQ(count.num_observations_by_image, (std::map<ImageId, size_t>{{1, 2}, {2, 0}}));
 }
 
 TEST(CountOnDistractors, PixelsOutsideTheMaskAreExcluded) {

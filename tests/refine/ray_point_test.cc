@@ -133,20 +133,6 @@ TEST(PixelRay, PixelsWithoutARayHaveNone) {
   EXPECT_FALSE(MakePixelRay(camera, {}, {322.0 + 0.9 * 500.0, 237.0}));
 }
 
-TEST(TriangulationAngleDeg, IsTheLargestAngleByHand) {
-  PixelRay left, middle, right;
-  left.centre = {-1.0, 0.0, 0.0};
-  middle.centre = {0.0, 0.0, 0.0};
-  right.centre = {1.0, 0.0, 0.0};
-  const Pointers rays = {&left, &middle, &right};
-  EXPECT_NEAR(TriangulationAngleDeg(rays, {0.0, 0.0, 1.0}), 90.0, 1e-12);
-  EXPECT_NEAR(TriangulationAngleDeg(Pointers{&left, &middle}, {0.0, 0.0, 1.0}), 45.0, 1e-12);
-  EXPECT_EQ(TriangulationAngleDeg(rays, {0.0, 0.0, 1.0}, 30.0), 30.0);
-  EXPECT_NEAR(TriangulationAngleDeg(rays, {0.0, 0.0, 1.0}, 91.0), 90.0, 1e-12);
-  EXPECT_NEAR(TriangulationAngleDeg(rays, {0.5, 0.0, 0.0}), 180.0, 1e-12);
-  EXPECT_EQ(TriangulationAngleDeg(Pointers{&left}, {0.0, 0.0, 1.0}), 0.0);
-}
-
 TEST(EstimateRayPoint, IsExactOnExactRays) {
   for (const Camera& camera : SampleCameras()) {
     for (int num_rays = 2; num_rays <= 10; ++num_rays) {
