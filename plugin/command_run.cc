@@ -42,7 +42,8 @@ std::function<void()> DeclareRun(Flags& flags) {
       .Add("use_masks", &options.use_masks, "0 = mask nothing, for comparison")
       .Add("reference_path",
            &options.reference_path,
-           "COLMAP model or predictions with better poses, to compare with");
+           "Better poses by image name, to compare with: COLMAP model, predictions, "
+           "transforms.json, TUM trajectory");
   command->run_flags.Declare(flags);
   flags.Group("Output")
       .Require(

@@ -2,10 +2,9 @@
 #include "plugin/report.h"
 
 #include "bridge/colmap_model.h"
-#include "bridge/predictions.h"
+#include "bridge/pose_files.h"
 #include "plugin/refine_report.h"
 #include "plugin/table.h"
-#include "scene/error.h"
 
 #include <algorithm>
 
@@ -153,17 +152,6 @@ json AsJson(const PipelineReport& report) {
   if (report.feedforward_error) object["feedforward_error"] = AsJson(*report.feedforward_error);
   if (report.refined_error) object["refined_error"] = AsJson(*report.refined_error);
   return object;
-}
-
-std::map<std::string, Rigid3d> ReadPoses(const std::filesystem::path& path) {
-  if (IsModelFolder(path)) return CamFromWorldByName(ReadModel(path));
-  if (!std::filesystem::exists(path / "predictions.json")) {
-    Fail(path, "holds neither", "a COLMAP model or a predictions folder");
-  }
-  std::map<std::string, Rigid3d> poses;
-  const PredictionReader predictions(path);
-  for (const View& view : predictions.views()) poses[view.name] = view.cam_from_world;
-  return poses;
 }
 
 PipelineReport MakeReport(const Workspace& workspace, const PipelineOptions& options) {

@@ -3,10 +3,7 @@
 
 #include "plugin/pipeline.h"
 #include "plugin/workspace.h"
-#include "scene/rigid3d.h"
 
-#include <filesystem>
-#include <map>
 #include <string>
 
 #include <nlohmann/json.hpp>
@@ -20,9 +17,6 @@ nlohmann::json OptionsAsJson(const PipelineOptions& options);
 nlohmann::json AsJson(const ReprojectionStats& stats);
 nlohmann::json AsJson(const PoseComparison& comparison);
 nlohmann::json AsJson(const PipelineReport& report);
-
-// Poses by image name of a COLMAP model or a predictions folder. Throws Error if it is neither.
-std::map<std::string, Rigid3d> ReadPoses(const std::filesystem::path& path);
 
 // Reads the two models of a finished workspace and says what each photo and each step brought.
 PipelineReport MakeReport(const Workspace& workspace, const PipelineOptions& options);

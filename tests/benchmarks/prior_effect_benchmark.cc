@@ -5,6 +5,7 @@
 // track only, so that views are weak, and for several --min_num_observations. Means over up to five
 // choices of these tracks.
 #include "bridge/colmap_database.h"
+#include "bridge/pose_files.h"
 #include "bridge/predictions.h"
 #include "bridge/seed.h"
 #include "evaluation/pose_error.h"

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bridge/import_tum.h"
-
 #include "bridge/import.h"
 #include "bridge/predictions.h"
 #include "scene/error.h"
 #include "scene/files.h"
 #include "tests/bridge/numpy_files.h"
 #include "tests/support/temporary_folder.h"
-
-#include <cmath>
 
 #include <gtest/gtest.h>
 
@@ -17,43 +13,6 @@ namespace {
 
 // 90 degrees around z: x_in_world = (-y, x, z) + t.
 constexpr const char* kTurned = " 1 2 3 0 0 0.70710678118654752 0.70710678118654752\n";
-
-std::string MessageOf(const std::string& text) {
-  try {
-    ParseTumTrajectory(text, "t.txt");
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
-
-TEST(ParseTumTrajectory, QuaternionsComeWithTheScalarLast) {
-  const auto poses = ParseTumTrajectory("# comment\n\n7.5" + std::string(kTurned), "t.txt");
-  ASSERT_EQ(poses.size(), 1u);
-  EXPECT_EQ(poses[0].label, "7.5");
-  const Eigen::Vector3d point = poses[0].world_from_cam * Eigen::Vector3d(10, 20, 30);
-  EXPECT_LT((point - Eigen::Vector3d(-20 + 1, 10 + 2, 30 + 3)).norm(), 1e-12);
-}
-
-TEST(ParseTumTrajectory, LabelsMayBeNamesWithSpaces) {
-  const auto poses = ParseTumTrajectory("my photo 1.jpg 1 2 3 0 0 0 1\r\n", "t.txt");
-  EXPECT_EQ(poses[0].label, "my photo 1.jpg");
-  EXPECT_EQ(ParseTumTrajectory("a,1,2,3,0,0,0,1", "t.csv")[0].label, "a");
-}
-
-TEST(ParseTumTrajectory, DamagedLinesAreNamed) {
-  for (const char* bad : {"1 2 3 0 0 0 1",          // no label
-                          "1.0 1 2 3 0 0 0 x",      // no number
-                          "1.0 1 2 nan 0 0 0 1",    // not finite
-                          "1.0 1 2 1e999 0 0 0 1",  // too large
-                          "1.0 1 2 3 0 0 0 0",      // no rotation
-                          "1.0 1 2 3 0 0 0 2"}) {   // not of unit length
-    const std::string message = MessageOf("0.5 1 2 3 0 0 0 1\n" + std::string(bad) + "\n");
-    EXPECT_NE(message.find("line 2"), std::string::npos) << bad << ": " << message;
-  }
-  EXPECT_NE(MessageOf(""), "");
-  EXPECT_NE(MessageOf("# nothing\n"), "");
-}
 
 struct Case {
   TemporaryFolder folder;
