@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evaluation/depth_grid.h"
 
+#include "scene/error.h"
+
 #include <cmath>
 #include <limits>
 
@@ -52,6 +54,24 @@ DepthMap ProjectPoints(const View& view, const std::vector<Eigen::Vector3d>& poi
     if (!(nearest <= z)) nearest = z;
   }
   return depth;
+}
+
+void AddCommonDepths(const DepthMap& predicted,
+                     const DepthMap& expected,
+                     double max_depth,
+                     DepthPairs& pairs) {
+  VGTW_CHECK(predicted.width() == expected.width() && predicted.height() == expected.height(),
+             "depth maps of different sizes");
+  const auto is_known = [](float depth) { return std::isfinite(depth) && depth > 0.0f; };
+  for (size_t i = 0; i < expected.size(); ++i) {
+    const float predicted_depth = predicted.data()[i];
+    const float expected_depth = expected.data()[i];
+    if (!is_known(predicted_depth) || !is_known(expected_depth) || expected_depth > max_depth) {
+      continue;
+    }
+    pairs.predicted.push_back(predicted_depth);
+    pairs.expected.push_back(expected_depth);
+  }
 }
 
 }  // namespace vgtw

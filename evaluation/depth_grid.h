@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "evaluation/depth_error.h"
 #include "scene/depth_map.h"
 #include "scene/view.h"
 
@@ -24,5 +25,12 @@ DepthMap RegridDepth(const View& from,
 // its projection lies in, and the nearest of a pixel's points is its depth; unknown where none is.
 // Points have no extent, so that what is sparse on this grid lets pixels see what lies behind it.
 DepthMap ProjectPoints(const View& view, const std::vector<Eigen::Vector3d>& points_in_world);
+
+// Adds the depths of the pixels that are known in both maps, of one size, and expected to be at
+// most `max_depth`.
+void AddCommonDepths(const DepthMap& predicted,
+                     const DepthMap& expected,
+                     double max_depth,
+                     DepthPairs& pairs);
 
 }  // namespace vgtw

@@ -164,7 +164,7 @@ class PointTree::ManyNearest {
 
   void Add(const Candidate& candidate) {
     found_.push_back(candidate);
-    if (found_.size() >= 4 * k_) KeepBest();
+    if (found_.size() >= 2 * k_) KeepBest();
   }
 
   void KeepBest() {

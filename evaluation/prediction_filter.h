@@ -38,6 +38,9 @@ class PredictionFilter {
 
   size_t num_views() const { return num_views_; }
 
+  // Confidence from which depths are kept, if that is one number for all views; else 0.
+  double pooled_threshold() const { return pooled_threshold_; }
+
   // The view with unknown depth where it is left out, its samples likewise; confidences, mask and
   // points have done their work and are empty. Depth comes from points where there is no map of it.
   ViewPrediction Filtered(size_t view_idx) const;

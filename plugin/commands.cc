@@ -84,6 +84,18 @@ const std::vector<Command>& Commands() {
        DeclareRun,
        "  vgtw run --image_path photos/ --predictions_path predictions/ --output_path out/"},
       {"evaluate", "Poses, points and depths against a reference, as numbers"},
+      {"evaluate points",
+       "Clouds: accuracy, completeness, normal consistency, F",
+       DeclareEvaluatePoints,
+       "  vgtw evaluate points --input_path predictions/ --reference_path truth/\n"
+       "  vgtw evaluate points --input_path out/points.ply --reference_path scan.ply --icp "
+       "similarity"},
+      {"evaluate depth",
+       "Depths: AbsRel and delta < 1.25, reprojected or as maps",
+       DeclareEvaluateDepth,
+       "  vgtw evaluate depth --input_path predictions/ --reference_path truth/\n"
+       "  vgtw evaluate depth --input_path predictions/ --reference_path truth/ --method maps "
+       "--keep_percent 100"},
       {"probe", kProbeSummary, {}, {}, BecomeNetworkProgram},
       {"weights", kWeightsSummary},
       {"weights inspect", kWeightsInspectSummary, {}, {}, BecomeNetworkProgram},

@@ -15,6 +15,8 @@ namespace vgtw {
 // One function per command, each in its own command_<name>.cc: declares flags, returns the work.
 std::function<void()> DeclareDemo(Flags& flags);
 std::function<void()> DeclareDoctor(Flags& flags);
+std::function<void()> DeclareEvaluateDepth(Flags& flags);
+std::function<void()> DeclareEvaluatePoints(Flags& flags);
 std::function<void()> DeclareImport(Flags& flags);
 std::function<void()> DeclareMaskApply(Flags& flags);
 std::function<void()> DeclareMaskConvert(Flags& flags);

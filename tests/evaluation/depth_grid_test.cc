@@ -116,5 +116,18 @@ TEST(RegridDepth, ReadsAtTheSamePlaceOfThePhoto) {
   }
 }
 
+TEST(AddCommonDepths, TakesWhatBothKnowWithinTheLimit) {
+  DepthMap predicted(4, 1, 2.0f);
+  DepthMap expected(4, 1, 3.0f);
+  predicted(0, 0) = kNaN;
+  expected(1, 0) = 0.0f;
+  expected(2, 0) = 5.0f;
+  DepthPairs pairs;
+  AddCommonDepths(predicted, expected, 4.0, pairs);
+  EXPECT_EQ(pairs.predicted, std::vector<double>{2.0});
+  EXPECT_EQ(pairs.expected, std::vector<double>{3.0});
+  EXPECT_THROW(AddCommonDepths(DepthMap(1, 4), expected, 4.0, pairs), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace vgtw

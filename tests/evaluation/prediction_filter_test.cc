@@ -49,6 +49,7 @@ TEST(PredictionFilter, PooledShareFavoursTheConfidentView) {
   PredictionFilterOptions options;
   options.keep_percent = 25.0;
   const PredictionFilter filter = MakeFilter(TwoViews(), options);
+  EXPECT_NEAR(filter.pooled_threshold(), 100.0 * 0.5 * kNumPixels, 100.0 * kPixels);
   EXPECT_EQ(NumKnown(filter.Filtered(0).depth), 0u);
   EXPECT_NEAR(double(NumKnown(filter.Filtered(1).depth)), 0.25 * 2 * kNumPixels, kPixels);
 }
