@@ -155,6 +155,12 @@ CloudAlignment AlignClouds(const CloudSource& prediction,
   return AlignByCameras(prediction, reference);
 }
 
+std::vector<Eigen::Vector3d> Moved(const Sim3d& reference_from_prediction,
+                                   std::vector<Eigen::Vector3d> points) {
+  for (Eigen::Vector3d& point : points) point = reference_from_prediction * point;
+  return points;
+}
+
 std::string AlignmentText(const CloudAlignment& alignment) {
   if (alignment.method == "none") return "not aligned";
   return "Sim3-aligned (Umeyama) on " + std::to_string(alignment.num_pairs) +

@@ -67,6 +67,9 @@ CloudAlignment AlignClouds(const CloudSource& prediction,
                            const CloudSource& reference,
                            const std::string& method);
 
+std::vector<Eigen::Vector3d> Moved(const Sim3d& reference_from_prediction,
+                                   std::vector<Eigen::Vector3d> points);
+
 std::string AlignmentText(const CloudAlignment& alignment);
 nlohmann::json AsJson(const CloudAlignment& alignment);
 nlohmann::json AsJson(const Sim3d& reference_from_prediction);

@@ -15,11 +15,6 @@ namespace {
 using Points = std::vector<Eigen::Vector3d>;
 using nlohmann::json;
 
-Points Moved(const Sim3d& motion, Points points) {
-  for (Eigen::Vector3d& point : points) point = motion * point;
-  return points;
-}
-
 json AsJson(const DirectedCloudError& error) {
   return {{"num_points", error.num_points},
           {"num_clipped", error.num_clipped},

@@ -23,11 +23,6 @@ DepthSource FromMaps(const CloudSource& prediction) {
   };
 }
 
-std::vector<Eigen::Vector3d> Moved(const Sim3d& motion, std::vector<Eigen::Vector3d> points) {
-  for (Eigen::Vector3d& point : points) point = motion * point;
-  return points;
-}
-
 DepthSource FromCloud(CloudSource& prediction, const Sim3d& motion, bool of_all_views) {
   if (!of_all_views) {
     return [&prediction, motion](const std::string& name, const View& reference) {
