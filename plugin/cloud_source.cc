@@ -8,6 +8,7 @@
 #include "plugin/table.h"
 #include "scene/error.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace vgtw {
@@ -82,6 +83,11 @@ const std::vector<Eigen::Vector3d>& CloudSource::Points() {
   return points_;
 }
 
+bool CloudSource::HasMaps() const {
+  return std::ranges::any_of(
+      idx_by_name_, [&](const auto& view) { return ViewOf(view.first).network_width > 0; });
+}
+
 const View& CloudSource::ViewOf(const std::string& name) const {
   return predictions_->views()[idx_by_name_.at(name)];
 }
@@ -140,7 +146,7 @@ std::vector<std::string> CommonViews(const CloudSource& prediction, const CloudS
 CloudAlignment AlignClouds(const CloudSource& prediction,
                            const CloudSource& reference,
                            const std::string& method) {
-  const bool have_pixels = !prediction.views().empty() && !reference.views().empty();
+  const bool have_pixels = prediction.HasMaps() && reference.HasMaps();
   const bool have_cameras = !prediction.poses().empty() && !reference.poses().empty();
   if (method == "pixels" && !have_pixels) {
     Fail(prediction.path(), "or the reference has no depth maps", "predictions folders");

@@ -31,6 +31,7 @@ class CloudSource {
 
   // The views of predictions by name; empty for the others.
   const std::map<std::string, size_t>& views() const { return idx_by_name_; }
+  bool HasMaps() const;  // of depth, not only samples of it
   // Of predictions.
   const View& ViewOf(const std::string& name) const;
   ViewPrediction Filtered(const std::string& name) const;

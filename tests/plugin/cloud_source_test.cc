@@ -87,6 +87,19 @@ TEST_F(CloudSourceTest, PixelsAndCamerasGiveTheSimilarityBetweenTheWorlds) {
   EXPECT_EQ(none.reference_from_prediction.scale, 1.0);
 }
 
+TEST_F(CloudSourceTest, PredictionsWithoutMapsAreAlignedByCameras) {
+  Prediction samples = DentedWall({});
+  for (ViewPrediction& view : samples.views) {
+    view.depth = {};
+    view.view.network_width = view.view.network_height = 0;
+    view.depth_samples = {{{20.0f, 20.0f}, 5.0f, 1.0f}};
+  }
+  CloudSource prediction = Predictions("samples", samples);
+  const CloudSource reference = Predictions("reference", DentedWall(kOtherFromWorld));
+  EXPECT_EQ(prediction.Points().size(), 3u);
+  EXPECT_EQ(AlignClouds(prediction, reference, "auto").method, "cameras");
+}
+
 TEST_F(CloudSourceTest, WhatASourceHasNotIsNamed) {
   const CloudSource prediction = Predictions("prediction", DentedWall({}));
   WritePly(folder_ / "points.ply", {{{1.0f, 2.0f, 3.0f}, {0, 0, 0}}});
