@@ -40,13 +40,21 @@ std::vector<Misreading> Misreadings() {
   return misreadings;
 }
 
+// A repair that is made twice is undone.
+ConventionRepair Toggled(const ConventionRepair& a, const ConventionRepair& b) {
+  return {a.invert_poses != b.invert_poses,
+          a.opengl_axes != b.opengl_axes,
+          a.swap_quaternion_order != b.swap_quaternion_order};
+}
+
 }  // namespace
 
-std::vector<PoseReading> OtherReadings(const std::vector<NamedPose>& poses) {
+std::vector<PoseReading> OtherReadings(const std::vector<NamedPose>& poses,
+                                       const ConventionRepair& as_read) {
   std::vector<PoseReading> readings;
   for (const Misreading& misreading : Misreadings()) {
     PoseReading reading;
-    reading.options = OptionsText(misreading.repair);
+    reading.options = OptionsText(Toggled(misreading.repair, as_read));
     for (const NamedPose& pose : poses) {
       const Rigid3d as_stored =
           misreading.is_world_from_cam ? Inverse(pose.cam_from_world) : pose.cam_from_world;

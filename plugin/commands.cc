@@ -84,6 +84,12 @@ const std::vector<Command>& Commands() {
        DeclareRun,
        "  vgtw run --image_path photos/ --predictions_path predictions/ --output_path out/"},
       {"evaluate", "Poses, points and depths against a reference, as numbers"},
+      {"evaluate pose",
+       "ATE, RPE, RRA, RTA, AUC and the errors of each view",
+       DeclareEvaluatePose,
+       "  vgtw evaluate pose --input_path sparse/0 --reference_path truth/sparse\n"
+       "  vgtw evaluate pose --input_path slam.txt --reference_path groundtruth.txt --alignment "
+       "se3 --robust"},
       {"evaluate points",
        "Clouds: accuracy, completeness, normal consistency, F",
        DeclareEvaluatePoints,

@@ -17,6 +17,7 @@ std::function<void()> DeclareDemo(Flags& flags);
 std::function<void()> DeclareDoctor(Flags& flags);
 std::function<void()> DeclareEvaluateDepth(Flags& flags);
 std::function<void()> DeclareEvaluatePoints(Flags& flags);
+std::function<void()> DeclareEvaluatePose(Flags& flags);
 std::function<void()> DeclareImport(Flags& flags);
 std::function<void()> DeclareMaskApply(Flags& flags);
 std::function<void()> DeclareMaskConvert(Flags& flags);
