@@ -89,7 +89,9 @@ struct DemoCommand {
 
   std::string NextCommands() const {
     const std::string out = options.output_path.string();
-    return "\nLook at:  " + out + "/contact_sheet.png\n" +
+    return "\nLook at:  " + out + "/report.html (what the masks bought)\n          " + out +
+           "/with_masks/report.html (what refinement bought)\n          " + out +
+           "/contact_sheet.png\n" +
            "Next:\n"
            "  colmap gui --import_path " +
            out + "/with_masks/sparse/refined --database_path " + out +

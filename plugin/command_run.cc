@@ -21,7 +21,8 @@ struct RunCommand {
     const PipelineReport report = RunPipeline(options);
     Finish(usability,
            FormatReport(report) + "written: " + options.output_path.string() +
-               " (database.db, masks/, sparse/feedforward, sparse/refined, points.ply, run.json)\n",
+               " (database.db, masks/, sparse/feedforward, sparse/refined, points.ply, run.json, "
+               "report.html)\n",
            AsJson(report));
   }
 };

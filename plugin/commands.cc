@@ -83,6 +83,13 @@ const std::vector<Command>& Commands() {
        "Photos and predictions -> masks, database, refined COLMAP model, report",
        DeclareRun,
        "  vgtw run --image_path photos/ --predictions_path predictions/ --output_path out/"},
+      {"compare",
+       "Models side by side, per photo: did it help, and where not? Tables and report.html",
+       DeclareCompare,
+       "  vgtw compare out/sparse/feedforward out/sparse/refined --database_path out/database.db "
+       "--image_path photos/ --output_path report.html\n"
+       "  vgtw compare seed/ refined/ colmap/sparse/0 --reference_path truth/ --csv_path "
+       "figures.csv"},
       {"evaluate", "Poses, points and depths against a reference, as numbers"},
       {"evaluate pose",
        "ATE, RPE, RRA, RTA, AUC and the errors of each view",

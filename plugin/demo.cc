@@ -5,6 +5,8 @@
 #include "bridge/colmap_model.h"
 #include "bridge/mask_files.h"
 #include "bridge/predictions.h"
+#include "plugin/comparison.h"
+#include "plugin/comparison_pictures.h"
 #include "plugin/contact_sheet.h"
 #include "plugin/progress.h"
 #include "scene/image_io.h"
@@ -114,6 +116,23 @@ void DrawContactSheet(const DemoOptions& options) {
   WriteImage(out / "contact_sheet.png", MakeContactSheet(rows));
 }
 
+void WriteReport(const DemoOptions& options) {
+  const fs::path& out = options.output_path;
+  ComparisonInputs inputs;
+  for (const char* name : {"without_masks", "with_masks"}) {
+    const fs::path path = out / name / "sparse" / "refined";
+    inputs.models.push_back({name, path, ReadModel(path)});
+  }
+  inputs.reference_path = out / "truth" / "sparse";
+  inputs.reference = CamFromWorldByName(ReadModel(inputs.reference_path));
+  inputs.image_path = out / "photos";
+  inputs.mask_path = out / "truth" / "masks";
+  inputs.title = "A made scene, reconstructed without and with masks";
+  inputs.command = "vgtw demo";
+  inputs.num_threads = options.pipeline.num_threads;
+  WriteComparisonPage(out / "report.html", inputs, CompareModels(inputs));
+}
+
 }  // namespace
 
 DemoReport RunDemo(const DemoOptions& options) {
@@ -122,6 +141,7 @@ DemoReport RunDemo(const DemoOptions& options) {
   report.with_masks = RunOnce(options, /*use_masks=*/true);
   report.without_masks = RunOnce(options, /*use_masks=*/false);
   DrawContactSheet(options);
+  WriteReport(options);
   return report;
 }
 

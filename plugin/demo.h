@@ -29,7 +29,8 @@ struct DemoReport {
 };
 
 // Writes photos/, predictions/ (the truth with feed-forward errors), truth/{masks,sparse}, runs the
-// pipeline into with_masks/ and without_masks/, and draws contact_sheet.png.
+// pipeline into with_masks/ and without_masks/, draws contact_sheet.png, and compares the two
+// refined models in report.html.
 DemoReport RunDemo(const DemoOptions& options);
 
 }  // namespace vgtw

@@ -250,6 +250,17 @@ Flags& Flags::AddChoice(std::string_view name,
   return *this;
 }
 
+Flags& Flags::Positional(std::string_view name,
+                         std::vector<std::filesystem::path>* values,
+                         int min_num,
+                         std::string_view help) {
+  impl_->app->add_option(std::string(name), *values, std::string(help))
+      ->group(impl_->group)
+      ->expected(min_num, std::numeric_limits<int>::max())
+      ->required();
+  return *this;
+}
+
 Flags& Flags::Require(std::string_view name, std::filesystem::path* value, std::string_view help) {
   impl_->app->add_option("--" + std::string(name), *value, std::string(help))
       ->group(impl_->group)

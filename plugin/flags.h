@@ -31,6 +31,11 @@ class Flags {
                    std::string* value,
                    std::vector<std::string> choices,
                    std::string_view help);
+  // Paths without a flag's name, at least `min_num`.
+  Flags& Positional(std::string_view name,
+                    std::vector<std::filesystem::path>* values,
+                    int min_num,
+                    std::string_view help);
   // A path that must be given.
   Flags& Require(std::string_view name, std::filesystem::path* value, std::string_view help);
 

@@ -303,6 +303,7 @@ void Pipeline::Refine() {
 }
 
 PipelineReport Pipeline::Report() {
+  WriteReportPage(workspace_, options_);
   PipelineReport report = MakeReport(workspace_, options_);
   report.notes.insert(report.notes.begin(), notes_.begin(), notes_.end());
   workspace_.Record("report", AsJson(report));

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/refine_report.h"
 
+#include "plugin/json_number.h"
 #include "plugin/table.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 namespace vgtw {
@@ -13,8 +13,6 @@ namespace {
 using nlohmann::json;
 
 constexpr size_t kMaxNames = 5;
-
-json NumberOrNull(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
 json AsJson(const RefinedView& view) {
   return {{"outcome", Name(view.outcome)},
@@ -127,6 +125,7 @@ json AsJson(const RefineModelResult& result) {
           {"rounds", rounds},
           {"is_out_of_time", result.is_out_of_time},
           {"num_held_out_tracks", result.num_held_out_tracks},
+          {"held_out_max_px", result.held_out_max_px},
           {"held_out_before_px", NumberOrNull(result.held_out_before_px)},
           {"held_out_after_px", NumberOrNull(result.held_out_after_px)},
           {"uncertainty", AsJson(result.uncertainty)}};

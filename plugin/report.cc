@@ -3,6 +3,8 @@
 
 #include "bridge/colmap_model.h"
 #include "bridge/pose_files.h"
+#include "plugin/comparison.h"
+#include "plugin/comparison_pictures.h"
 #include "plugin/refine_report.h"
 #include "plugin/table.h"
 
@@ -12,6 +14,7 @@ namespace vgtw {
 namespace {
 
 using nlohmann::json;
+namespace fs = std::filesystem;
 
 std::vector<ViewReport> ReportViews(const json& stages,
                                     const Reconstruction& feedforward,
@@ -171,6 +174,23 @@ PipelineReport MakeReport(const Workspace& workspace, const PipelineOptions& opt
     report.notes.push_back("the reference shares fewer than 3 views in general position");
   }
   return report;
+}
+
+void WriteReportPage(const Workspace& workspace, const PipelineOptions& options) {
+  ComparisonInputs inputs;
+  inputs.models = {{"feed-forward", workspace.feedforward(), ReadModel(workspace.feedforward())},
+                   {"refined", workspace.refined(), ReadModel(workspace.refined())}};
+  inputs.reference_path = options.reference_path;
+  if (!options.reference_path.empty()) inputs.reference = ReadPoses(options.reference_path);
+  inputs.image_path = options.image_path;
+  if (options.use_masks) inputs.mask_path = workspace.masks();
+  inputs.database_path = workspace.database();
+  UseRunRecord(workspace.record(), inputs);
+  const fs::path folder = fs::absolute(workspace.folder()).lexically_normal();
+  inputs.title = (folder.has_filename() ? folder : folder.parent_path()).filename().string();
+  inputs.command = "vgtw run";
+  inputs.num_threads = options.num_threads;
+  WriteComparisonPage(workspace.report(), inputs, CompareModels(inputs));
 }
 
 std::string FormatReport(const PipelineReport& report) {

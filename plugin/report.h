@@ -21,4 +21,7 @@ nlohmann::json AsJson(const PipelineReport& report);
 // Reads the two models of a finished workspace and says what each photo and each step brought.
 PipelineReport MakeReport(const Workspace& workspace, const PipelineOptions& options);
 
+// Writes report.html of a finished workspace: its two models side by side (plugin/comparison.h).
+void WriteReportPage(const Workspace& workspace, const PipelineOptions& options);
+
 }  // namespace vgtw

@@ -16,9 +16,13 @@ using nlohmann::json;
 
 constexpr const char* kFormat = "vgtw-run";
 
+bool IsRecord(const json& record) {
+  return record.is_object() && record.contains("format") && record["format"] == kFormat;
+}
+
 json ReadRecord(const fs::path& path) {
   const json record = json::parse(ReadFile(path), nullptr, /*allow_exceptions=*/false);
-  if (!record.is_object() || !record.contains("format") || record["format"] != kFormat) {
+  if (!IsRecord(record)) {
     Fail(path, "is not a run record of vgtw", "one", "name another --output_path or remove it");
   }
   return record;
@@ -95,5 +99,14 @@ void Workspace::Record(const std::string& key, const json& value) {
 }
 
 void Workspace::Save() const { WriteFileAtomically(folder_ / "run.json", record_.dump(2) + "\n"); }
+
+json RunRecordOf(const fs::path& model_path) {
+  const fs::path whole = fs::weakly_canonical(model_path);
+  const fs::path folder = whole.has_filename() ? whole : whole.parent_path();
+  const fs::path path = folder.parent_path().parent_path() / "run.json";
+  if (!fs::is_regular_file(path)) return nullptr;
+  json record = json::parse(ReadFile(path), nullptr, /*allow_exceptions=*/false);
+  return IsRecord(record) ? record : nullptr;
+}
 
 }  // namespace vgtw

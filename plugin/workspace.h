@@ -24,6 +24,7 @@ class Workspace {
   std::filesystem::path feedforward() const { return folder_ / "sparse" / "feedforward"; }
   std::filesystem::path refined() const { return folder_ / "sparse" / "refined"; }
   std::filesystem::path points() const { return folder_ / "points.ply"; }
+  std::filesystem::path report() const { return folder_ / "report.html"; }
   std::filesystem::path log(const std::string& stage) const;
   // An empty scratch folder of one stage, removed by the destructor.
   std::filesystem::path Scratch(const std::string& stage) const;
@@ -49,5 +50,9 @@ class Workspace {
   std::string chain_;  // hash of the stages so far
   nlohmann::json record_;
 };
+
+// run.json of the workspace that has this model as <workspace>/sparse/<name>; null where there is
+// none that can be read.
+nlohmann::json RunRecordOf(const std::filesystem::path& model_path);
 
 }  // namespace vgtw

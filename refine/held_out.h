@@ -26,6 +26,8 @@ class HeldOutJudge {
   // matches nor a few large errors decide.
   HeldOutJudge(std::vector<Track> tracks, double scale_px, double max_error_px, int num_threads);
 
+  double max_error_px() const { return max_error_px_; }
+
   // Reprojection errors (pixels, at most max_error_px) of all observations, at the point of each
   // track that is best under `model`. An error is max_error_px where the image is missing.
   using Errors = std::vector<double>;

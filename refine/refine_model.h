@@ -85,6 +85,7 @@ struct RefineModelResult {
   std::vector<RefineRound> rounds;
   bool is_out_of_time = false;  // max_seconds were over
   size_t num_held_out_tracks = 0;
+  double held_out_max_px = 0.0;  // errors beyond count alike
   double held_out_before_px = std::numeric_limits<double>::quiet_NaN();
   double held_out_after_px = std::numeric_limits<double>::quiet_NaN();
   Uncertainty uncertainty;  // of what was refined

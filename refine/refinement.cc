@@ -339,6 +339,7 @@ Reconstruction Refinement::TriangulateAll(const Reconstruction& poses,
 RefineModelResult Refinement::Run() {
   RefineModelResult result;
   result.num_held_out_tracks = split_.held_out.size();
+  result.held_out_max_px = judge_.max_error_px();
   result.held_out_before_px = start_px_;
   RoundLimits limits = first_limits_;
   for (int i = 0; i < options_.max_num_rounds && !IsLate(); ++i) {

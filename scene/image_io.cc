@@ -73,6 +73,13 @@ std::string LowerExtension(const fs::path& path) {
   return extension;
 }
 
+cv::Mat BgrOf(const RgbImage& image) {
+  const cv::Mat rgb(image.height(), image.width(), CV_8UC3, const_cast<Rgb*>(image.data().data()));
+  cv::Mat bgr;
+  if (!image.empty()) cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
+  return bgr;
+}
+
 void Encode(const fs::path& path, const cv::Mat& pixels) {
   const std::string extension = LowerExtension(path);
   if (extension != ".png" && extension != ".jpg" && extension != ".jpeg") {
@@ -186,11 +193,15 @@ std::optional<GrayImage> ReadAlpha(const fs::path& path) {
   return alpha;
 }
 
-void WriteImage(const fs::path& path, const RgbImage& image) {
-  const cv::Mat rgb(image.height(), image.width(), CV_8UC3, const_cast<Rgb*>(image.data().data()));
-  cv::Mat bgr;
-  if (!image.empty()) cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
-  Encode(path, bgr);
+void WriteImage(const fs::path& path, const RgbImage& image) { Encode(path, BgrOf(image)); }
+
+std::vector<std::byte> EncodeJpeg(const RgbImage& image, int quality) {
+  VGTW_CHECK(!image.empty() && quality >= 1 && quality <= 100, "EncodeJpeg");
+  std::vector<uchar> bytes;
+  VGTW_CHECK(cv::imencode(".jpg", BgrOf(image), bytes, {cv::IMWRITE_JPEG_QUALITY, quality}),
+             "an image of at most 65500 pixels a side");
+  const auto view = std::as_bytes(std::span(bytes));
+  return {view.begin(), view.end()};
 }
 
 void WriteImage(const fs::path& path, const GrayImage& image) {

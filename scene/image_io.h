@@ -5,6 +5,7 @@
 #include "scene/grid.h"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -55,6 +56,9 @@ std::optional<GrayImage> ReadAlpha(const std::filesystem::path& path);
 // 8-bit PNG (or JPEG by extension), written atomically; parent folders are created.
 void WriteImage(const std::filesystem::path& path, const RgbImage& image);
 void WriteImage(const std::filesystem::path& path, const GrayImage& image);
+
+// The bytes of a JPEG file; `quality` in [1, 100].
+std::vector<std::byte> EncodeJpeg(const RgbImage& image, int quality);
 
 // Focal length in pixels by COLMAP's default rule, from a JPEG's EXIF: 35-mm equivalent / 35 *
 // max(width, height); else FocalLength, rounded to 0.1 mm as COLMAP 3.8 does, over the sensor's

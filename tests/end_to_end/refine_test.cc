@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // `vgtw refine`.
-#include "bridge/colmap_database.h"
 #include "bridge/colmap_model.h"
 #include "scene/files.h"
 #include "tests/end_to_end/run_vgtw.h"
 #include "tests/support/bytes.h"
+#include "tests/support/model_database.h"
 #include "tests/support/synthetic_model.h"
 #include "tests/support/temporary_folder.h"
 
@@ -23,34 +23,8 @@ constexpr double kPixelSigma = 0.3;
 
 // A database whose keypoints are the model's points2D, and whose verified matches are its tracks.
 void WriteDatabase(const Reconstruction& model, const fs::path& path) {
-  ColmapDatabase database = ColmapDatabase::Create(path);
-  ColmapDatabase::Transaction transaction(database);
-  for (const auto& [id, camera] : model.cameras) database.WriteCamera(camera);
-  for (const auto& [id, image] : model.images) {
-    database.WriteImage({id, image.name, image.camera_id});
-    Keypoints keypoints{static_cast<uint32_t>(image.points2D.size()), 2, {}};
-    for (const Point2D& point2D : image.points2D) {
-      keypoints.data.push_back(static_cast<float>(point2D.xy.x()));
-      keypoints.data.push_back(static_cast<float>(point2D.xy.y()));
-    }
-    database.WriteKeypoints(id, keypoints);
-  }
-  std::map<std::pair<ImageId, ImageId>, FeatureMatches> matches;
-  for (const auto& [id, point] : model.points3D) {
-    for (size_t i = 0; i < point.track.size(); ++i) {
-      for (size_t k = i + 1; k < point.track.size(); ++k) {
-        matches[{point.track[i].image_id, point.track[k].image_id}].push_back(
-            {point.track[i].point2D_idx, point.track[k].point2D_idx});
-      }
-    }
-  }
-  for (const auto& [pair, inliers] : matches) {
-    TwoViewGeometry geometry;
-    geometry.config = 2;
-    geometry.inlier_matches = inliers;
-    database.WriteTwoViewGeometry(pair.first, pair.second, geometry);
-  }
-  transaction.Commit();
+  ColmapDatabase database = CreateDatabaseOf(model, path);
+  WriteMatchesOfTracks(model, database);
 }
 
 Reconstruction WithoutPoints(Reconstruction model) {

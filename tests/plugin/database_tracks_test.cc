@@ -2,6 +2,7 @@
 #include "plugin/database_tracks.h"
 
 #include "scene/error.h"
+#include "tests/support/model_database.h"
 #include "tests/support/synthetic_model.h"
 #include "tests/support/temporary_folder.h"
 
@@ -12,30 +13,11 @@
 namespace vgtw {
 namespace {
 
-Keypoints KeypointsOf(const Image& image) {
-  Keypoints keypoints;
-  keypoints.rows = static_cast<uint32_t>(image.points2D.size());
-  keypoints.cols = 4;
-  for (const Point2D& point2D : image.points2D) {
-    const Eigen::Vector2f xy = point2D.xy.cast<float>();
-    keypoints.data.insert(keypoints.data.end(), {xy.x(), xy.y(), 2.0f, 0.0f});
-  }
-  return keypoints;
-}
-
 // A database with the keypoints of a model of 4 images and 30 points. Neighbouring images match.
 class DatabaseTracks : public testing::Test {
  protected:
   DatabaseTracks()
-      : model_(MakeModel()), database_(ColmapDatabase::Create(folder_.path() / "a.db")) {
-    ColmapDatabase::Transaction transaction(database_);
-    for (const auto& [id, camera] : model_.cameras) database_.WriteCamera(camera);
-    for (const auto& [id, image] : model_.images) {
-      database_.WriteImage({id, image.name, image.camera_id});
-      database_.WriteKeypoints(id, KeypointsOf(image));
-    }
-    transaction.Commit();
-  }
+      : model_(MakeModel()), database_(CreateDatabaseOf(model_, folder_.path() / "a.db")) {}
 
   static Reconstruction MakeModel() {
     SyntheticModelOptions options;
@@ -51,17 +33,9 @@ class DatabaseTracks : public testing::Test {
     return matches;
   }
 
-  void WriteVerified(ImageId image_id1, ImageId image_id2, const FeatureMatches& matches) {
-    ColmapDatabase::Transaction transaction(database_);
-    TwoViewGeometry geometry;
-    geometry.config = kTwoViewCalibrated;
-    geometry.inlier_matches = matches;
-    database_.WriteTwoViewGeometry(image_id1, image_id2, geometry);
-    transaction.Commit();
-  }
-
   void WriteNeighbours() {
-    for (ImageId id = 1; id < 4; ++id) WriteVerified(id, id + 1, FirstMatches(30));
+    for (ImageId id = 1; id < 4; ++id)
+      WriteVerifiedMatches(id, id + 1, FirstMatches(30), database_);
   }
 
   TemporaryFolder folder_;
@@ -119,9 +93,9 @@ TEST_F(DatabaseTracks, OnlyVerifiedMatchesBetweenImagesOfTheModelCount) {
     database_.WriteMatches(1, 4, FirstMatches(30));  // not verified
     transaction.Commit();
   }
-  WriteVerified(2, 1, FirstMatches(5));
-  WriteVerified(2, 3, {});
-  WriteVerified(3, 4, FirstMatches(20));
+  WriteVerifiedMatches(2, 1, FirstMatches(5), database_);
+  WriteVerifiedMatches(2, 3, {}, database_);
+  WriteVerifiedMatches(3, 4, FirstMatches(20), database_);
   Reconstruction model = model_;
   for (Point3DId id = 1; id <= 30; ++id) {
     RemoveObservation(model, {4, static_cast<uint32_t>(id - 1)});
@@ -138,7 +112,7 @@ TEST_F(DatabaseTracks, OnlyVerifiedMatchesBetweenImagesOfTheModelCount) {
 TEST_F(DatabaseTracks, ADatabaseWithoutVerifiedMatchesIsRefused) {
   Reconstruction model = model_;
   for (const bool has_empty_pair : {false, true}) {
-    if (has_empty_pair) WriteVerified(1, 2, {});
+    if (has_empty_pair) WriteVerifiedMatches(1, 2, {}, database_);
     try {
       ReadTracks(database_, model);
       ADD_FAILURE() << "no error";
@@ -152,7 +126,7 @@ TEST_F(DatabaseTracks, ADatabaseWithoutVerifiedMatchesIsRefused) {
 }
 
 TEST_F(DatabaseTracks, ImagesWithoutKeypointsHaveNoTracks) {
-  WriteVerified(1, 2, FirstMatches(30));
+  WriteVerifiedMatches(1, 2, FirstMatches(30), database_);
   Reconstruction model = model_;
   Image& image = model.images[9];
   image.image_id = 9;
