@@ -77,7 +77,7 @@ TEST(AlignByIcp, RecoversASmallMotion) {
     IcpOptions options;
     options.max_distance = 0.2;
     options.with_scale = scale != 1.0;
-    options.max_iterations = 200;
+    options.max_iterations = 60;
     options.min_change = 0.0;
     const auto result =
         AlignByIcp(PointTree(points), PointTree(Moved(target_from_source, points)), {}, options);
@@ -100,7 +100,7 @@ TEST(AlignByIcp, KeepsTheScaleOfTheFirstGuessUnlessItIsLookedFor) {
   guess.scale = 4.0;
   IcpOptions options;
   options.max_distance = 1.0;
-  options.max_iterations = 200;
+  options.max_iterations = 60;
   const auto result =
       AlignByIcp(PointTree(points), PointTree(Moved(target_from_source, points)), guess, options);
   ASSERT_TRUE(result);
@@ -116,7 +116,7 @@ TEST(AlignByIcp, ScaleDoesNotShrinkTheCloudIntoOtherOne) {
   IcpOptions options;
   options.max_distance = 10.0;
   options.with_scale = true;
-  options.max_iterations = 300;
+  options.max_iterations = 100;
   const auto result = AlignByIcp(PointTree(points), PointTree(points), guess, options);
   ASSERT_TRUE(result);
   EXPECT_NEAR(result->target_from_source.scale, 1.0, 1e-3);
