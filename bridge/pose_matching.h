@@ -10,13 +10,10 @@
 namespace vgtw {
 
 // Which pose of an estimate belongs to which of a reference:
-//   names to names            equal ones; if none are, the only ones equal without folder, or
-//   without
-//                             folder and extension
-//   timestamps to timestamps  pairs of the least difference first, up to the tolerance
-//   anything else             labels of a trajectory that all name a view, else the i-th to the
-//   i-th
-//                             in the order of both, for which the counts must agree
+//   names, names    equal ones; if none are equal, without folder, or without folder and extension
+//   times, times    pairs of the least difference first, up to the tolerance
+//   anything else   labels of a trajectory that all name a view; else the i-th to the i-th in the
+//                   order of both, for which the counts must agree
 struct MatchedPoses {
   std::vector<NamedPose> estimate;  // under the reference's names
   size_t num_surplus = 0;           // of the estimate that no view of the reference wanted

@@ -29,8 +29,8 @@ struct PairAccuracy {
   double rotation = 0.0;   // RRA: rotation errors below the threshold
   double direction = 0.0;  // RTA: min(a, 180 - a) of direction errors a below the threshold
   // AUC: area under the share of pairs whose larger error of both is below a threshold, over
-  // thresholds up to this one, in two definitions that differ by up to 0.2 (all errors of 0.5 deg
-  // have 1 and 0.83 at 3 deg).
+  // thresholds up to this one, in two definitions that differ (all errors of 0.5 deg have 1 and
+  // 0.83 at 3 deg).
   // "histogram": mean of the cumulative histogram of bins of 1 deg, of min(a, 180 - a); as VGGT's,
   // PoseDiffusion's and pi3's evaluations of CO3D and RealEstate10K.
   double auc_histogram = 0.0;
@@ -45,8 +45,7 @@ PairAccuracy ComputePairAccuracy(const std::vector<PairError>& errors,
                                  int threshold_deg,
                                  size_t num_missing = 0);
 
-// The two definitions on errors as they are; infinity is a wrong pair. NaN if `errors_deg` is
-// empty.
+// The two definitions on errors as they are, of which infinity is a wrong pair; NaN for none.
 double AucHistogram(const std::vector<double>& errors_deg, int threshold_deg);
 double AucTrapezoid(std::vector<double> errors_deg, double threshold_deg);
 

@@ -22,8 +22,7 @@ struct BetterReading {
 };
 
 // The reading of the estimate's poses that agrees best with the reference, the first of those that
-// are as good within 20 %; nullopt if none is far better. Of more than 64 common views 64 are
-// asked.
+// are as good within 20 %; nullopt if none is far better. Looks at up to 64 of the common views.
 std::optional<BetterReading> FindBetterReading(const std::vector<NamedPose>& estimate,
                                                const std::vector<std::vector<NamedPose>>& readings,
                                                const std::vector<NamedPose>& reference);

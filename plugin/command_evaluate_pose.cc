@@ -258,8 +258,9 @@ std::function<void()> DeclareEvaluatePose(Flags& flags) {
       .Add("robust",
            &options.alignment.robust,
            "Align on the views that agree (least median of squares); all count in the figures")
-      .Add(
-          "rpe_delta", &options.rpe.delta, "Views between the two of a pair of the RPE, at least 1")
+      .Add("rpe_delta",
+           &options.rpe.delta,
+           "Step from the first to the second view of a pair of the RPE, at least 1")
       .Add("rpe_all_pairs", &options.rpe.all_pairs, "0 = only every delta-th pair, end to end")
       .Add("auc", &options.auc_deg, "Thresholds of RRA, RTA and AUC, degrees: 3,5,10,30")
       .Add("count_missing",
