@@ -109,6 +109,12 @@ const std::vector<Command>& Commands() {
        "  vgtw evaluate depth --input_path predictions/ --reference_path truth/\n"
        "  vgtw evaluate depth --input_path predictions/ --reference_path truth/ --method maps "
        "--keep_percent 100"},
+      {"export",
+       "Cameras and points for other programs: PLY, PCD, transforms.json, TUM, KITTI",
+       DeclareExport,
+       "  vgtw export --input_path out/sparse/refined --format transforms --output_path "
+       "transforms.json\n"
+       "  vgtw export --input_path predictions/ --format tum --label name --output_path poses.txt"},
       {"probe", kProbeSummary, {}, {}, BecomeNetworkProgram},
       {"weights", kWeightsSummary},
       {"weights inspect", kWeightsInspectSummary, {}, {}, BecomeNetworkProgram},

@@ -19,6 +19,7 @@ std::function<void()> DeclareDoctor(Flags& flags);
 std::function<void()> DeclareEvaluateDepth(Flags& flags);
 std::function<void()> DeclareEvaluatePoints(Flags& flags);
 std::function<void()> DeclareEvaluatePose(Flags& flags);
+std::function<void()> DeclareExport(Flags& flags);
 std::function<void()> DeclareImport(Flags& flags);
 std::function<void()> DeclareMaskApply(Flags& flags);
 std::function<void()> DeclareMaskConvert(Flags& flags);
