@@ -45,7 +45,8 @@ double CoveragePercent(const Image& image, const Camera& camera) {
 
 ViewQuality QualityOf(const Reconstruction& model,
                       const Image& image,
-                      const AnglesDeg& angles_deg) {
+                      const AnglesDeg& angles_deg,
+                      std::vector<double>& all_errors_px) {
   ViewQuality quality;
   std::vector<double> errors_px;
   std::vector<double> view_angles_deg;
@@ -62,6 +63,7 @@ ViewQuality QualityOf(const Reconstruction& model,
   quality.mean_track_length =
       static_cast<double>(sum_track_lengths) / static_cast<double>(quality.num_observations);
   quality.median_angle_deg = Median(std::move(view_angles_deg));
+  all_errors_px.insert(all_errors_px.end(), errors_px.begin(), errors_px.end());
   if (!errors_px.empty()) quality.median_px = Median(std::move(errors_px));
   return quality;
 }
@@ -75,11 +77,14 @@ ModelQuality MeasureQuality(const Reconstruction& model,
   const AnglesDeg angles_deg = AnglesOf(model);
   double sum_coverage = 0.0;
   for (const auto& [id, image] : model.images) {
-    quality.views[id] = QualityOf(model, image, angles_deg);
+    quality.views[id] = QualityOf(model, image, angles_deg, quality.errors_px);
     sum_coverage += quality.views[id].coverage_percent;
   }
   if (!model.images.empty()) {
     quality.coverage_percent = sum_coverage / static_cast<double>(model.images.size());
+  }
+  for (const auto& [id, point] : model.points3D) {
+    quality.track_lengths.push_back(static_cast<double>(point.track.size()));
   }
   std::vector<double> all_angles_deg;
   for (const auto& [id, angle_deg] : angles_deg) all_angles_deg.push_back(angle_deg);

@@ -11,6 +11,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace vgtw {
 
@@ -34,6 +35,8 @@ struct ModelQuality {
   double coverage_percent = 0.0;                                       // mean over images
   std::optional<size_t> num_points_on_distractors;                     // known with masks
   std::map<ImageId, ViewQuality> views;
+  std::vector<double> errors_px;      // of all observations in front of their cameras
+  std::vector<double> track_lengths;  // of all points
 };
 
 // `mask` gives the true mask of an image by name, see evaluation/distractor_points.h; empty = none.

@@ -3,6 +3,7 @@
 
 #include "bridge/colmap_database.h"
 #include "bridge/mask_files.h"
+#include "evaluation/histogram.h"
 #include "evaluation/model_quality.h"
 #include "evaluation/pose_error.h"
 #include "evaluation/scale_drift.h"
@@ -41,6 +42,10 @@ json AsJson(const std::optional<PoseComparison>& error) {
           {"rotation_median_deg", NumberOrNull(error->relative_rotation_median_deg)},
           {"direction_median_deg", NumberOrNull(error->relative_direction_median_deg)},
           {"num_views", error->views.size()}};
+}
+
+json AsJson(const Histogram& histogram) {
+  return {{"first", histogram.first}, {"step", histogram.step}, {"counts", histogram.counts}};
 }
 
 // Errors of the database's tracks under each model.
@@ -89,6 +94,7 @@ class Comparison {
                    {"models", json::array()},
                    {"views", Views()}};
     for (size_t i = 0; i < judgements_.size(); ++i) result["models"].push_back(ModelAsJson(i));
+    AddHistograms(result["models"]);
     result["guilty"] = FindGuiltyViews(result);
     result["summary"] = Summarise(result);
     result["notes"] = notes_;
@@ -209,6 +215,24 @@ class Comparison {
                                                : json(nullptr)},
             {"scale_drift_percent", OrNull(judgement.scale_drift_percent)},
             {"pose_error", AsJson(judgement.error)}};
+  }
+
+  // Of each model, over bins that hold 9 of 10 observations of every one.
+  void AddHistograms(json& models) const {
+    constexpr size_t kNumBins = 40;
+    constexpr size_t kMaxTrackLength = 30;
+    double max_px = 0.0;
+    for (const Judgement& judgement : judgements_) {
+      max_px = std::max(max_px, judgement.quality.reprojection.p90_px);
+    }
+    const double step_px = max_px > 0.0 ? max_px / kNumBins : 1.0;
+    for (size_t i = 0; i < judgements_.size(); ++i) {
+      const ModelQuality& quality = judgements_[i].quality;
+      models[i]["error_histogram"] =
+          AsJson(MakeHistogram(quality.errors_px, 0.0, step_px, kNumBins));
+      models[i]["track_histogram"] =
+          AsJson(MakeHistogram(quality.track_lengths, 2.0, 1.0, kMaxTrackLength - 1));
+    }
   }
 
   json Views() const {

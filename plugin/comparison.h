@@ -54,7 +54,8 @@ void UseRunRecord(const nlohmann::json& record, ComparisonInputs& inputs);
 //   title, summary [sentences, the first is the answer], notes [..], producer, command, alignment
 //   models [{name, path, role: before | after | other | reference, num_images, num_points3D,
 //     num_observations, mean_track_length, median_px, p90_px, median_angle_deg, coverage_percent,
-//     held_out_px, points_on_distractors, scale_drift_percent,
+//     held_out_px, points_on_distractors, scale_drift_percent, error_histogram and track_histogram
+//     {first, step, counts} of observations (px) and points, over the same bins for all models,
 //     pose_error {centre_rmse_percent, rotation_median_deg, direction_median_deg, num_views}}]
 //   views [{name, width, height, excluded_percent, by_model [{num_observations, median_px,
 //     held_out_px, coverage_percent, mean_track_length, median_angle_deg,

@@ -146,7 +146,7 @@ function showPlots() {
   const pair = before < 0 ? '' : `${models[before].name} to ${models[after].name}`;
   const charts = after < 0 ? [] : [
     viewChart(errorKey, errorKey === 'held_out_px' ? 'Held-out error of each photo' : 'Reprojection error of each photo',
-      'Median, in pixels of the photo; the worst first. Further left is better.'),
+      `${errorKey === 'held_out_px' ? 'Robust mean' : 'Median'}, in pixels of the photo; the worst first. Further left is better.`),
     viewChart('rotation_change_deg', 'How far each camera turned', `Degrees from ${pair}, after alignment.`, true),
     viewChart('centre_change_percent', 'How far each camera moved', `From ${pair}, after alignment, in % of the cameras’ extent.`, true),
     viewChart('rotation_error_deg', 'Rotation against the reference', 'Error of each camera in degrees, after alignment.'),

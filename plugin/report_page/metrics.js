@@ -10,7 +10,7 @@ const kModelFigures = [
     help: 'median of the directions from camera to camera against the reference' },
   { key: 'num_views', of: 'pose_error', label: 'Photos compared with the reference', unit: '', better: null },
   { key: 'held_out_px', label: 'Held-out error', unit: 'px', better: 'lower',
-    help: 'median reprojection error of matches that took no part in the adjustment' },
+    help: 'robust mean reprojection error of tracks that took no part in the adjustment' },
   { key: 'median_px', label: 'Reprojection error', unit: 'px', better: 'lower',
     help: 'median distance between where a point is seen and where the model puts it' },
   { key: 'p90_px', label: 'Reprojection error, 9 of 10 below', unit: 'px', better: 'lower' },

@@ -54,6 +54,9 @@ TEST(MeasureQuality, FiguresByHand) {
   EXPECT_NEAR(view.median_angle_deg, shallow_deg, 1e-9);
   // Cells (6, 5), (6, 5) and, beyond the border, (9, 5).
   EXPECT_DOUBLE_EQ(view.coverage_percent, 2.0);
+  ASSERT_EQ(quality.errors_px.size(), 6u);
+  EXPECT_NEAR(quality.errors_px[3 + 2], 2.0, 1e-9);
+  EXPECT_EQ(quality.track_lengths, (std::vector<double>{2.0, 2.0, 2.0}));
 }
 
 TEST(MeasureQuality, ImagesWithoutObservationsHaveNoMedians) {

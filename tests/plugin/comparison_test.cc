@@ -47,6 +47,8 @@ TEST_F(CompareModelsTest, ErrorsAndChangesAreThoseOfThePoses) {
   const json& off = comparison.at("models").at(0);
   const json& good = comparison.at("models").at(1);
   EXPECT_EQ(off.at("role"), "before");
+  EXPECT_EQ(off.at("error_histogram").at("step"), good.at("error_histogram").at("step"));
+  EXPECT_EQ(good.at("track_histogram").at("counts").at(4), 120);  // six photos see each point
   EXPECT_EQ(good.at("role"), "after");
   // An arc cosine of nearly 1.
   EXPECT_NEAR(good.at("pose_error").at("rotation_median_deg"), 0.0, 1e-6);
