@@ -14,7 +14,6 @@ namespace vgtw {
 namespace {
 
 using nlohmann::json;
-namespace fs = std::filesystem;
 
 std::vector<ViewReport> ReportViews(const json& stages,
                                     const Reconstruction& feedforward,
@@ -186,8 +185,7 @@ void WriteReportPage(const Workspace& workspace, const PipelineOptions& options)
   if (options.use_masks) inputs.mask_path = workspace.masks();
   inputs.database_path = workspace.database();
   UseRunRecord(workspace.record(), inputs);
-  const fs::path folder = fs::absolute(workspace.folder()).lexically_normal();
-  inputs.title = (folder.has_filename() ? folder : folder.parent_path()).filename().string();
+  inputs.title = options.output_path.string();
   inputs.command = "vgtw run";
   inputs.num_threads = options.num_threads;
   WriteComparisonPage(workspace.report(), inputs, CompareModels(inputs));
