@@ -14,8 +14,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kImporters = {
-    &kColmapImporter, &kVggtNpzImporter, &kNpzFolderImporter, &kLlffImporter, &kTumImporter};
+constexpr std::array kImporters = {&kColmapImporter,
+                                   &kVggtNpzImporter,
+                                   &kNpzFolderImporter,
+                                   &kLlffImporter,
+                                   &kTumImporter,
+                                   &kMonst3rImporter};
 
 struct Located {
   const Importer* importer = nullptr;

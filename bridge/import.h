@@ -18,7 +18,8 @@ enum class ImportFormat {
   kVggtNpz,    // predictions.npz of VGGT's and VGTW's demos
   kNpzFolder,  // one <image name or stem>.npz (or folder of .npy) per image
   kTum,        // trajectory "timestamp tx ty tz qx qy qz qw" (camera-to-world) + intrinsics
-  kLlff        // poses_bounds.npy
+  kLlff,       // poses_bounds.npy
+  kMonst3r     // folder of MonST3R or Easi3R: pred_traj.txt, pred_intrinsics.txt, frame_*.npy
 };
 
 // How per-pixel maps relate to the original photos. kAuto is resolved from the sizes.

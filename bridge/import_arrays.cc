@@ -46,7 +46,30 @@ Grid<float> NextMap(NpyReader& reader, const MapSize& size) {
   return map;
 }
 
+bool IsUsableSize(uint64_t height, uint64_t width) {
+  return height >= 2 && width >= 2 && height <= kMaxMapSide && width <= kMaxMapSide &&
+         height * width <= kMaxMapPixels;
+}
+
 }  // namespace
+
+MapSize SingleMapSize(const NpyReader& reader) {
+  std::vector<uint64_t> shape = reader.shape();
+  if (shape.size() > 2 && shape.back() == 1) shape.pop_back();
+  shape = StackShape(std::move(shape), 3);
+  if (shape.size() != 3 || shape[0] != 1 || !IsUsableSize(shape[1], shape[2])) {
+    FailShape(reader, "(H, W), at most 2^28 pixels");
+  }
+  return {static_cast<int>(shape[2]), static_cast<int>(shape[1])};
+}
+
+Grid<float> ReadSingleMap(NpyReader& reader) { return NextMap(reader, SingleMapSize(reader)); }
+
+void ForgetNonPositive(DepthMap& depth) {
+  for (float& value : depth.data()) {
+    if (!(value > 0.0f)) value = kUnknown;
+  }
+}
 
 std::optional<ArrayViews::Stack> ArrayViews::OpenMatrices(const ArrayStore& store,
                                                           const std::string& key,
@@ -77,9 +100,8 @@ std::optional<ArrayViews::Stack> ArrayViews::OpenMaps(const ArrayStore& store,
     shape.push_back(1);
   }
   shape = StackShape(std::move(shape), 4);
-  const bool fits = shape.size() == 4 && shape[0] >= 1 && shape[0] <= kMaxViews && shape[1] >= 2 &&
-                    shape[2] >= 2 && shape[1] <= kMaxMapSide && shape[2] <= kMaxMapSide &&
-                    shape[1] * shape[2] <= kMaxMapPixels && shape[3] == num_channels;
+  const bool fits = shape.size() == 4 && shape[0] >= 1 && shape[0] <= kMaxViews &&
+                    IsUsableSize(shape[1], shape[2]) && shape[3] == num_channels;
   if (!fits) {
     FailShape(stack.reader,
               num_channels == 1 ? "(S, H, W) or (S, H, W, 1), at most 2^28 pixels a view"
@@ -132,9 +154,7 @@ ViewArrays ArrayViews::Next() {
   }
   if (depth_) {
     view.depth = NextMap(depth_->reader, *map_size_);
-    for (float& depth : view.depth.data()) {
-      if (!(depth > 0.0f)) depth = kUnknown;
-    }
+    ForgetNonPositive(view.depth);
   }
   if (depth_conf_) view.depth_conf = NextMap(depth_conf_->reader, *map_size_);
   if (distractor_) view.distractor = NextDistractor();

@@ -43,6 +43,16 @@ struct ViewArrays {
   Grid<Eigen::Vector3f> points;
 };
 
+// Size of the single map [H,W] in a file of its own, which may also be [1,H,W] or [H,W,1]. Throws
+// Error for other shapes or absurd sizes.
+MapSize SingleMapSize(const NpyReader& reader);
+
+// Its values, once; those that are not finite are NaN. Throws Error as above, or if it ends early.
+Grid<float> ReadSingleMap(NpyReader& reader);
+
+// Depths <= 0 mean unknown.
+void ForgetNonPositive(DepthMap& depth);
+
 // Reads the views of a store in their order, one at a time.
 class ArrayViews {
  public:

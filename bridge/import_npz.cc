@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/import_arrays.h"
-#include "bridge/import_cameras.h"
 #include "bridge/import_geometry.h"
+#include "bridge/import_views.h"
 #include "bridge/importer.h"
 #include "bridge/npz.h"
 #include "scene/error.h"
-#include "scene/network_pixels.h"
 
 #include <algorithm>
 #include <tuple>
@@ -16,33 +15,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A coarse grid of the point map.
-std::vector<Anchor> MakeAnchors(const NetworkGeometry& geometry,
-                                const Grid<Eigen::Vector3f>& points) {
-  constexpr int kPerSide = 24;
-  std::vector<Anchor> anchors;
-  if (points.empty()) return anchors;
-  const int step_x = std::max(1, points.width() / kPerSide);
-  const int step_y = std::max(1, points.height() / kPerSide);
-  for (int y = step_y / 2; y < points.height(); y += step_y) {
-    for (int x = step_x / 2; x < points.width(); x += step_x) {
-      if (!points(x, y).allFinite()) continue;
-      const Eigen::Vector2d pixel =
-          Apply(geometry.original_from_network, Eigen::Vector2d(x + 0.5, y + 0.5));
-      anchors.push_back({points(x, y).cast<double>(), pixel});
-    }
-  }
-  return anchors;
-}
-
-// Turns arrays into views of the photos and counts what had to be left out.
+// Turns arrays into views of the photos.
 class ArrayImport {
  public:
   ArrayImport(const ImportJob& job, const ViewSink& sink, ImportSummary& summary)
-      : job_(job),
-        sink_(sink),
-        summary_(summary),
-        cameras_(job.image_folder, job.photos, job.options.camera_params) {}
+      : job_(job), summary_(summary), views_(job, sink, summary) {}
 
   // One geometry per element of `photo_indices`.
   void Resolve(const std::vector<size_t>& photo_indices, const std::vector<MapSize>& map_sizes) {
@@ -59,46 +36,20 @@ class ArrayImport {
            size_t photo_idx,
            std::optional<size_t> geometry_idx,
            ViewArrays arrays) {
-    const Photo& photo = job_.photos[photo_idx];
-    ImportedView imported;
-    imported.photo_idx = photo_idx;
-    ViewPrediction& prediction = imported.prediction;
-    prediction.view.name = photo.name;
-    NetworkGeometry geometry;
-    if (geometry_idx) geometry = geometries_[*geometry_idx];
-    const std::optional<Camera> camera =
-        arrays.intrinsic ? CameraFromNetwork(*arrays.intrinsic, geometry, photo.size)
-                         : cameras_.Make(photo);
-    if (!camera || !arrays.extrinsic.allFinite()) {
-      bad_views_.push_back(photo.name);
-      return;
-    }
-    prediction.view.camera = *camera;
-    imported.pose = MakePose(path, photo.name, arrays.extrinsic);
-    prediction.view.cam_from_world = CamFromWorld(imported.pose, job_.options.repair);
-    prediction.view.network_width = geometry.network_width;
-    prediction.view.network_height = geometry.network_height;
-    prediction.view.original_from_network = geometry.original_from_network;
-    prediction.depth = std::move(arrays.depth);
-    prediction.depth_conf = std::move(arrays.depth_conf);
-    prediction.distractor = std::move(arrays.distractor);
-    prediction.points = std::move(arrays.points);
-    ForgetBars(prediction);
-    imported.anchors = MakeAnchors(geometry, prediction.points);
-    sink_(std::move(imported));
+    if (!arrays.extrinsic.allFinite()) return views_.LeaveOut(photo_idx);
+    NetworkView view;
+    view.pose = PoseFromMatrix(
+        path, job_.photos[photo_idx].name, arrays.extrinsic, /*is_world_from_cam=*/false);
+    view.intrinsic = arrays.intrinsic;
+    if (geometry_idx) view.geometry = geometries_[*geometry_idx];
+    view.depth = std::move(arrays.depth);
+    view.depth_conf = std::move(arrays.depth_conf);
+    view.distractor = std::move(arrays.distractor);
+    view.points = std::move(arrays.points);
+    views_.Add(photo_idx, std::move(view));
   }
 
-  void Finish() {
-    if (!bad_views_.empty()) {
-      summary_.warnings.push_back(std::to_string(bad_views_.size()) +
-                                  " views are left out: their pose or intrinsics are not finite or "
-                                  "have no positive focal length (first: " +
-                                  Printable(bad_views_.front()) + ")");
-    }
-    if (const std::string warning = cameras_.Warning(); !warning.empty()) {
-      summary_.warnings.push_back(warning);
-    }
-  }
+  void Finish() { views_.Finish(); }
 
   void NoteMask(const ArrayViews& views) {
     if (!views.has_mask_without_logits() || noted_mask_) return;
@@ -108,24 +59,10 @@ class ArrayImport {
   }
 
  private:
-  static FilePose MakePose(const fs::path& path,
-                           const std::string& name,
-                           const Eigen::Matrix<double, 3, 4>& extrinsic) {
-    const std::optional<Rigid3d> transform = RigidFromMatrix(extrinsic);
-    if (!transform) {
-      Fail(path,
-           "the 3x3 part of the extrinsic of " + Printable(name) + " is no rotation",
-           "[R|t] with R R^T = 1 and determinant +1");
-    }
-    return {*transform, /*is_world_from_cam=*/false, RotationForm::kMatrix};
-  }
-
   const ImportJob& job_;
-  const ViewSink& sink_;
   ImportSummary& summary_;
-  CameraSource cameras_;
+  ViewImport views_;
   std::vector<NetworkGeometry> geometries_;
-  std::vector<std::string> bad_views_;
   bool noted_mask_ = false;
 };
 
@@ -161,12 +98,7 @@ std::optional<fs::path> LocateStack(const fs::path& input_path, const PhotoIndex
 void ReadStack(const ImportJob& job, const ViewSink& sink, ImportSummary& summary) {
   const auto store = OpenArrayStore(job.input_path);
   ArrayViews views(*store);
-  if (views.num_views() != job.photos.size()) {
-    Fail(job.input_path,
-         "holds " + std::to_string(views.num_views()) + " views",
-         "one for each of the " + std::to_string(job.photos.size()) + " photos",
-         "name the folder that the network saw by --image_path");
-  }
+  CheckOnePerPhoto(job, views.num_views(), "views");
   CheckMapSize(views, job.input_path);
   ArrayImport import(job, sink, summary);
   if (views.map_size()) {
@@ -259,10 +191,7 @@ void ReadFolder(const ImportJob& job, const ViewSink& sink, ImportSummary& summa
     import.NoteMask(views);
   }
   import.Finish();
-  if (stores.size() < job.photos.size()) {
-    summary.notes.push_back(std::to_string(job.photos.size() - stores.size()) +
-                            " photos have no arrays and are left out");
-  }
+  NotePhotosLeftOut(job, stores.size(), summary);
 }
 
 }  // namespace

@@ -58,5 +58,6 @@ extern const Importer kVggtNpzImporter;
 extern const Importer kNpzFolderImporter;
 extern const Importer kTumImporter;
 extern const Importer kLlffImporter;
+extern const Importer kMonst3rImporter;
 
 }  // namespace vgtw

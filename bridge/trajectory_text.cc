@@ -17,8 +17,9 @@ namespace vgtw {
 namespace {
 
 constexpr std::string_view kSpace = " \t\r,";
-constexpr size_t kNumTumNumbers = 7;     // tx ty tz qx qy qz qw
-constexpr size_t kNumKittiNumbers = 12;  // [R|t], row-major
+constexpr size_t kNumTumNumbers = 7;      // tx ty tz qx qy qz qw
+constexpr size_t kNumKittiNumbers = 12;   // [R|t], row-major
+constexpr size_t kNumMatrixNumbers = 16;  // a 4x4 matrix
 constexpr char kTumLine[] = "\"timestamp tx ty tz qx qy qz qw\" with a unit quaternion";
 constexpr char kKittiLine[] = "twelve numbers, [R|t] of world_from_cam row by row";
 
@@ -62,6 +63,13 @@ std::optional<Rigid3d> ParseKittiLine(std::string_view line) {
       Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data()));
 }
 
+std::optional<std::vector<double>> ParseNumberLine(std::string_view line, size_t num_columns) {
+  std::vector<double> numbers(num_columns);
+  const std::optional<std::string_view> rest = SplitOffNumbers(line, numbers);
+  if (!rest || !rest->empty()) return std::nullopt;
+  return numbers;
+}
+
 // A line that is neither empty nor a comment.
 bool HoldsPose(std::string_view line) {
   const std::string_view trimmed = Trim(line);
@@ -84,7 +92,7 @@ std::string_view NextLine(std::string_view& text, size_t& line_number) {
 template <typename Parse>
 auto ParseLines(std::string_view text,
                 const std::string& origin,
-                const char* expected,
+                const std::string& expected,
                 const Parse& parse) {
   std::vector<typename decltype(parse(text))::value_type> poses;
   size_t line_number = 0;
@@ -97,7 +105,7 @@ auto ParseLines(std::string_view text,
     }
     poses.push_back(*std::move(pose));
   }
-  if (poses.empty()) Fail(origin, "holds no pose", "lines of " + std::string(expected));
+  if (poses.empty()) Fail(origin, "holds no numbers", "lines of " + expected);
   return poses;
 }
 
@@ -116,6 +124,8 @@ std::optional<double> ParseTimestamp(std::string_view token) {
 std::optional<TrajectoryFormat> FindTrajectoryFormat(std::string_view text) {
   size_t line_number = 0;
   const std::string_view line = NextLine(text, line_number);
+  // A matrix of world_from_cam ends in "0 0 0 1", which is a unit quaternion.
+  if (ParseNumberLine(line, kNumMatrixNumbers)) return std::nullopt;
   // Twelve numbers could also be a name of five and a pose, which nobody writes.
   if (ParseKittiLine(line)) return TrajectoryFormat::kKitti;
   if (ParseTumLine(line)) return TrajectoryFormat::kTum;
@@ -128,6 +138,16 @@ std::vector<TumPose> ParseTumTrajectory(std::string_view text, const std::string
 
 std::vector<Rigid3d> ParseKittiTrajectory(std::string_view text, const std::string& origin) {
   return ParseLines(text, origin, kKittiLine, ParseKittiLine);
+}
+
+std::vector<std::vector<double>> ParseNumberRows(std::string_view text,
+                                                 size_t num_columns,
+                                                 const std::string& origin) {
+  VGTW_CHECK(num_columns >= 1 && num_columns <= kNumMatrixNumbers, "columns");
+  return ParseLines(
+      text, origin, std::to_string(num_columns) + " numbers", [&](std::string_view line) {
+        return ParseNumberLine(line, num_columns);
+      });
 }
 
 }  // namespace vgtw

@@ -16,7 +16,8 @@ enum class TrajectoryFormat {
   kKitti  // KITTI odometry:  the 3x4 matrix [R|t] of world_from_cam, row by row
 };
 
-// By the first line that holds a pose; nullopt if it is of neither format.
+// By the first line that holds a pose; nullopt if it is of neither format. Sixteen numbers are a
+// 4x4 matrix, although the last seven may look like a pose of kTum.
 std::optional<TrajectoryFormat> FindTrajectoryFormat(std::string_view text);
 
 struct TumPose {
@@ -31,6 +32,12 @@ std::vector<TumPose> ParseTumTrajectory(std::string_view text, const std::string
 // world_from_cam by line. Throws Error naming the line if it is not of 12 finite numbers or R is no
 // rotation within 1 %.
 std::vector<Rigid3d> ParseKittiTrajectory(std::string_view text, const std::string& origin);
+
+// Matrices as text, one a line. Throws Error naming the line if it is not of `num_columns` finite
+// numbers (at most 16).
+std::vector<std::vector<double>> ParseNumberRows(std::string_view text,
+                                                 size_t num_columns,
+                                                 const std::string& origin);
 
 // The number that a label is; nullopt if it is none.
 std::optional<double> ParseTimestamp(std::string_view label);

@@ -12,6 +12,7 @@ namespace {
 const std::map<std::string, ImportFormat> kFormats = {{"auto", ImportFormat::kAuto},
                                                       {"colmap", ImportFormat::kColmap},
                                                       {"llff", ImportFormat::kLlff},
+                                                      {"monst3r", ImportFormat::kMonst3r},
                                                       {"npz_folder", ImportFormat::kNpzFolder},
                                                       {"tum", ImportFormat::kTum},
                                                       {"vggt_npz", ImportFormat::kVggtNpz}};

@@ -78,7 +78,23 @@ TEST(TrajectoryText, FormatsAreToldByTheirFirstPose) {
   EXPECT_EQ(FindTrajectoryFormat("1.5" + std::string(kTurned)), TrajectoryFormat::kTum);
   EXPECT_EQ(FindTrajectoryFormat("a b c d" + std::string(kTurned)), TrajectoryFormat::kTum);
   EXPECT_FALSE(FindTrajectoryFormat("1 2 3\n"));
+  // A 4x4 matrix, whose end looks like a translation and a unit quaternion.
+  EXPECT_FALSE(FindTrajectoryFormat("1 0 0 7 0 1 0 8 0 0 1 9 0 0 0 1\n"));
   EXPECT_FALSE(FindTrajectoryFormat(""));
+}
+
+TEST(TrajectoryText, RowsHaveTheirNumberOfColumns) {
+  EXPECT_EQ(ParseNumberRows("# fx fy cx cy\n1 2.5 -3 4e1\n\n5,6,7,8\r\n", 4, "k"),
+            (std::vector<std::vector<double>>{{1, 2.5, -3, 40}, {5, 6, 7, 8}}));
+  for (const char* bad : {"1 2 3", "1 2 3 4 5", "1 2 nan 4", "1 2 x 4"}) {
+    try {
+      ParseNumberRows("1 2 3 4\n" + std::string(bad) + "\n", 4, "k");
+      ADD_FAILURE() << bad;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("line 2"), std::string::npos) << error.what();
+    }
+  }
+  EXPECT_THROW(ParseNumberRows("\n", 4, "k"), Error);
 }
 
 TEST(TrajectoryText, TimestampsAreFiniteNumbers) {
