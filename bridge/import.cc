@@ -16,6 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr std::array kImporters = {&kColmapImporter,
                                    &kVggtNpzImporter,
+                                   &kDa3NpzImporter,
                                    &kNpzFolderImporter,
                                    &kLlffImporter,
                                    &kTumImporter,

@@ -19,6 +19,7 @@ enum class ImportFormat {
   kNpzFolder,  // one <image name or stem>.npz (or folder of .npy) per image
   kTum,        // trajectory "timestamp tx ty tz qx qy qz qw" (camera-to-world) + intrinsics
   kLlff,       // poses_bounds.npy
+  kDa3Npz,     // results.npz of Depth Anything 3
   kMonst3r     // folder of MonST3R or Easi3R: pred_traj.txt, pred_intrinsics.txt, frame_*.npy
 };
 

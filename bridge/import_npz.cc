@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/import_arrays.h"
 #include "bridge/import_geometry.h"
+#include "bridge/import_loaders.h"
 #include "bridge/import_views.h"
 #include "bridge/importer.h"
 #include "bridge/npz.h"
@@ -21,17 +22,14 @@ class ArrayImport {
   ArrayImport(const ImportJob& job, const ViewSink& sink, ImportSummary& summary)
       : job_(job), summary_(summary), views_(job, sink, summary) {}
 
-  // One geometry per element of `photo_indices`.
-  void Resolve(const std::vector<size_t>& photo_indices, const std::vector<MapSize>& map_sizes) {
-    std::vector<ImageSize> sizes;
-    for (const size_t idx : photo_indices) sizes.push_back(job_.photos[idx].size);
-    ResolvedResize resolved = ResolveResize(job_.input_path, sizes, map_sizes, job_.options.resize);
+  // Must come before views with maps.
+  void Use(ResolvedResize resolved) {
     summary_.resize = resolved.resize;
     if (!resolved.warning.empty()) summary_.warnings.push_back(resolved.warning);
     geometries_ = std::move(resolved.geometries);
   }
 
-  // `geometry_idx` is an index into what Resolve() was given; nullopt if the view has no maps.
+  // `geometry_idx` is an index into the geometries of Use(); nullopt if the view has no maps.
   void Add(const fs::path& path,
            size_t photo_idx,
            std::optional<size_t> geometry_idx,
@@ -88,24 +86,78 @@ bool HoldsArrays(const fs::path& path) {
 
 // --- All views in one store -----------------------------------------------------------------
 
-std::optional<fs::path> LocateStack(const fs::path& input_path, const PhotoIndex&) {
-  if (HoldsArrays(input_path)) return input_path;
-  const fs::path inside = input_path / "predictions.npz";
-  if (fs::is_directory(input_path) && IsZipFile(inside) && HoldsArrays(inside)) return inside;
+// Depth Anything 3 writes exports/npz/results.npz, or mini_npz without the images:
+//   depth [S,H,W] z-depth, conf [S,H,W], extrinsics [S,3,4] or [S,4,4] cam_from_world (OpenCV
+//   axes), intrinsics [S,3,3] in pixels of the maps, image [S,H,W,3]
+// Source: ByteDance-Seed/Depth-Anything-3: src/depth_anything_3/utils/export/npz.py, README.md.
+bool IsDepthAnything3(const ArrayStore& store) {
+  return store.Contains("extrinsics") && store.Contains("intrinsics") && store.Contains("depth") &&
+         !store.Contains("extrinsic") && !store.Contains("depth_conf") &&
+         !store.Contains("world_points");
+}
+
+std::optional<fs::path> LocateDepthAnything3(const fs::path& input_path, const PhotoIndex&) {
+  for (const char* inside : {"",
+                             "results.npz",
+                             "npz/results.npz",
+                             "mini_npz/results.npz",
+                             "exports/npz/results.npz",
+                             "exports/mini_npz/results.npz"}) {
+    const fs::path file = inside[0] == '\0' ? input_path : input_path / inside;
+    if (IsZipFile(file) && IsDepthAnything3(*OpenArrayStore(file))) return file;
+  }
   return std::nullopt;
 }
 
-void ReadStack(const ImportJob& job, const ViewSink& sink, ImportSummary& summary) {
+std::optional<fs::path> LocateStack(const fs::path& input_path, const PhotoIndex&) {
+  const auto holds_stack = [](const fs::path& path) {
+    return HoldsArrays(path) && !(IsZipFile(path) && IsDepthAnything3(*OpenArrayStore(path)));
+  };
+  if (holds_stack(input_path)) return input_path;
+  const fs::path inside = input_path / "predictions.npz";
+  if (fs::is_directory(input_path) && IsZipFile(inside) && holds_stack(inside)) return inside;
+  return std::nullopt;
+}
+
+std::vector<ImageSize> SizesOf(const std::vector<Photo>& photos) {
+  std::vector<ImageSize> sizes;
+  for (const Photo& photo : photos) sizes.push_back(photo.size);
+  return sizes;
+}
+
+// How the photos of a job became maps of one size.
+using ResolveStack = ResolvedResize (*)(const ImportJob& job, const MapSize& map_size);
+
+ResolvedResize ResolveVggt(const ImportJob& job, const MapSize& map_size) {
+  return ResolveResize(job.input_path,
+                       SizesOf(job.photos),
+                       std::vector<MapSize>(job.photos.size(), map_size),
+                       job.options.resize);
+}
+
+ResolvedResize ResolveDepthAnything3(const ImportJob& job, const MapSize& map_size) {
+  if (job.options.resize != ImportResize::kAuto) return ResolveVggt(job, map_size);
+  auto geometries = DepthAnything3Geometries(SizesOf(job.photos), map_size);
+  if (!geometries) {
+    Fail(job.input_path,
+         "maps of " + std::to_string(map_size.width) + "x" + std::to_string(map_size.height) +
+             " cannot come from these photos by Depth Anything 3's upper_bound_resize",
+         "the photos that the network saw",
+         "name those by --image_path, or say another way by --resize");
+  }
+  return {ImportResize::kStretch, *std::move(geometries), ""};
+}
+
+void ReadStackBy(ResolveStack resolve,
+                 const ImportJob& job,
+                 const ViewSink& sink,
+                 ImportSummary& summary) {
   const auto store = OpenArrayStore(job.input_path);
   ArrayViews views(*store);
   CheckOnePerPhoto(job, views.num_views(), "views");
   CheckMapSize(views, job.input_path);
   ArrayImport import(job, sink, summary);
-  if (views.map_size()) {
-    std::vector<size_t> photo_indices(job.photos.size());
-    for (size_t i = 0; i < photo_indices.size(); ++i) photo_indices[i] = i;
-    import.Resolve(photo_indices, std::vector<MapSize>(job.photos.size(), *views.map_size()));
-  }
+  if (views.map_size()) import.Use(resolve(job, *views.map_size()));
   for (size_t i = 0; i < views.num_views(); ++i) {
     std::optional<size_t> geometry_idx;
     if (views.map_size()) geometry_idx = i;
@@ -113,6 +165,15 @@ void ReadStack(const ImportJob& job, const ViewSink& sink, ImportSummary& summar
   }
   import.NoteMask(views);
   import.Finish();
+}
+
+void ReadStack(const ImportJob& job, const ViewSink& sink, ImportSummary& summary) {
+  ReadStackBy(ResolveVggt, job, sink, summary);
+}
+
+void ReadDepthAnything3(const ImportJob& job, const ViewSink& sink, ImportSummary& summary) {
+  ReadStackBy(ResolveDepthAnything3, job, sink, summary);
+  summary.notes.emplace_back("the views were taken for the photos in the order of their names");
 }
 
 // --- One store per photo --------------------------------------------------------------------
@@ -171,19 +232,21 @@ ArrayViews OpenSingle(const ArrayStore& store) {
 void ReadFolder(const ImportJob& job, const ViewSink& sink, ImportSummary& summary) {
   const std::vector<StoreOfPhoto> stores = FindStores(job.input_path, PhotoIndex(job.photos));
   CheckStores(job, stores);
-  std::vector<size_t> photo_indices;
+  std::vector<ImageSize> photo_sizes;
   std::vector<MapSize> map_sizes;
   std::vector<std::optional<size_t>> geometry_indices(stores.size());
   for (size_t i = 0; i < stores.size(); ++i) {
     const auto store = OpenArrayStore(stores[i].path);
     const ArrayViews views = OpenSingle(*store);
     if (!views.map_size()) continue;
-    geometry_indices[i] = photo_indices.size();
-    photo_indices.push_back(stores[i].photo_idx);
+    geometry_indices[i] = map_sizes.size();
+    photo_sizes.push_back(job.photos[stores[i].photo_idx].size);
     map_sizes.push_back(*views.map_size());
   }
   ArrayImport import(job, sink, summary);
-  if (!map_sizes.empty()) import.Resolve(photo_indices, map_sizes);
+  if (!map_sizes.empty()) {
+    import.Use(ResolveResize(job.input_path, photo_sizes, map_sizes, job.options.resize));
+  }
   for (size_t i = 0; i < stores.size(); ++i) {
     const auto store = OpenArrayStore(stores[i].path);
     ArrayViews views = OpenSingle(*store);
@@ -201,6 +264,12 @@ const Importer kVggtNpzImporter = {ImportFormat::kVggtNpz,
                                    "predictions.npz of the demos of VGGT or VGTW",
                                    LocateStack,
                                    ReadStack};
+
+const Importer kDa3NpzImporter = {ImportFormat::kDa3Npz,
+                                  "da3_npz",
+                                  "results.npz of Depth Anything 3",
+                                  LocateDepthAnything3,
+                                  ReadDepthAnything3};
 
 const Importer kNpzFolderImporter = {ImportFormat::kNpzFolder,
                                      "npz_folder",

@@ -55,6 +55,7 @@ struct Importer {
 
 extern const Importer kColmapImporter;
 extern const Importer kVggtNpzImporter;
+extern const Importer kDa3NpzImporter;
 extern const Importer kNpzFolderImporter;
 extern const Importer kTumImporter;
 extern const Importer kLlffImporter;

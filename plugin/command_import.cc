@@ -11,6 +11,7 @@ namespace {
 
 const std::map<std::string, ImportFormat> kFormats = {{"auto", ImportFormat::kAuto},
                                                       {"colmap", ImportFormat::kColmap},
+                                                      {"da3_npz", ImportFormat::kDa3Npz},
                                                       {"llff", ImportFormat::kLlff},
                                                       {"monst3r", ImportFormat::kMonst3r},
                                                       {"npz_folder", ImportFormat::kNpzFolder},

@@ -312,5 +312,80 @@ TEST(ImportNpzFolder, FoldersOfNpyFilesAndDoubledNames) {
   EXPECT_NE(test.Message().find("the same photo"), std::string::npos);
 }
 
+// As export_to_npz of Depth Anything 3 writes two views; maps of 28x14.
+Arrays DepthAnything3Views() {
+  std::vector<float> depth = Constant(2, 4);
+  for (size_t i = 0; i < depth.size(); ++i) depth[i] += 0.001f * static_cast<float>(i);
+  return {{"image", NpyBytes("|u1", "(2, 14, 28, 3)", std::string(2 * kNumPixels * 3, 'x'))},
+          {"depth", NpyFloats("(2, 14, 28)", depth)},
+          {"conf", NpyFloats("(2, 14, 28)", Constant(1.25, 7))},
+          {"extrinsics", NpyFloats("(2, 3, 4)", kExtrinsics)},
+          {"intrinsics", NpyFloats("(2, 3, 3)", kIntrinsics)}};
+}
+
+TEST(ImportDepthAnything3, FilesOfItsWriterAreUnderstood) {
+  Case test(DepthAnything3Views());
+  const fs::path written = test.folder / "scene" / "exports" / "mini_npz" / "results.npz";
+  fs::create_directories(written.parent_path());
+  Arrays mini = DepthAnything3Views();
+  mini.erase("image");
+  WriteNpz(written, mini, /*compressed=*/true);
+  for (const fs::path& input : {test.input, test.folder / "scene"}) {
+    test.input = input;
+    const ImportSummary summary = test.Run({.overwrite = true});
+    EXPECT_EQ(summary.format, ImportFormat::kDa3Npz);
+    EXPECT_EQ(summary.resize, ImportResize::kStretch);
+    EXPECT_TRUE(summary.warnings.empty());
+    const Prediction prediction = ReadPrediction(test.output);
+    EXPECT_EQ(prediction.views[1].view.camera.params, (std::vector<double>{64, 66, 28, 14}));
+    const Eigen::Vector3d point =
+        prediction.views[1].view.cam_from_world * Eigen::Vector3d(5, 6, 7);
+    EXPECT_LT((point - Eigen::Vector3d(7 + 1, 6 - 2, -5 + 3)).norm(), 1e-12);
+    EXPECT_EQ(prediction.views[0].depth(5, 1), 2.0f + 0.001f * 33.0f);
+    EXPECT_EQ(prediction.views[1].depth_conf(0, 0), 7.0f);
+  }
+}
+
+TEST(ImportDepthAnything3, PhotosOfSeveralShapesWereCutToTheSmallest) {
+  // At 504: 504x252 and 252x504, both cut to 252x252 around the centre; 126 columns are gone.
+  constexpr size_t kPixels = 252 * 252;
+  Arrays arrays = DepthAnything3Views();
+  arrays.erase("image");
+  arrays["depth"] = NpyFloats("(2, 252, 252)", std::vector<float>(2 * kPixels, 3.0f));
+  arrays["conf"] = NpyFloats("(2, 252, 252)", std::vector<float>(2 * kPixels, 1.0f));
+  arrays["intrinsics"] = NpyFloats(
+      "(2, 3, 3)", {300, 0, 126, 0, 300, 126, 0, 0, 1, 300, 0, 126, 0, 300, 126, 0, 0, 1});
+  Case test(arrays, {"a.png"});
+  WritePhotos(test.photos, {"b.png"}, kPhotoHeight, kPhotoWidth);
+  const Prediction prediction = test.RunAndRead();
+  // A scale of 1/9 on all sides, and principal points in the middle of each photo.
+  const std::vector<double> wide = prediction.views[0].view.camera.params;
+  const std::vector<double> upright = prediction.views[1].view.camera.params;
+  const std::vector<double> wide_truth = {300.0 / 9, 300.0 / 9, 28, 14};
+  const std::vector<double> upright_truth = {300.0 / 9, 300.0 / 9, 14, 28};
+  for (size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(wide[i], wide_truth[i], 1e-9);
+    EXPECT_NEAR(upright[i], upright_truth[i], 1e-9);
+  }
+}
+
+TEST(ImportDepthAnything3, DamagedFilesAreNamed) {
+  Arrays shape = DepthAnything3Views();
+  shape["conf"] = NpyFloats("(2, 28, 14)", Constant(1, 1));
+  EXPECT_NE(Case(shape).Message().find("(2, 28, 14)"), std::string::npos);
+  Arrays fewer = DepthAnything3Views();
+  EXPECT_NE(Case(fewer, {"a.png", "b.png", "c.png"}).Message().find("2 views"), std::string::npos);
+  Case other(DepthAnything3Views());
+  WritePhotos(other.photos, {"a.png", "b.png"}, 64, 64);
+  EXPECT_NE(other.Message().find("upper_bound_resize"), std::string::npos);
+  Arrays nan = DepthAnything3Views();
+  std::vector<float> extrinsics = kExtrinsics;
+  extrinsics[3] = kNan;
+  nan["extrinsics"] = NpyFloats("(2, 3, 4)", extrinsics);
+  const ImportSummary summary = Case(nan).Run();
+  EXPECT_EQ(summary.num_views, 1u);
+  EXPECT_EQ(summary.warnings.size(), 1u);
+}
+
 }  // namespace
 }  // namespace vgtw
