@@ -30,7 +30,8 @@ std::vector<Rigid3d> WithoutNames(const std::vector<NamedPose>& named) {
 
 TEST(PairAccuracy, AgreesWithNumPyAndSciPy) {
   const nlohmann::json trajectories = ReadGolden("evo_trajectories")["cases"];
-  for (const auto& [name, golden] : ReadGolden("pair_accuracy")["cases"].items()) {
+  const nlohmann::json cases = ReadGolden("pair_accuracy")["cases"];
+  for (const auto& [name, golden] : cases.items()) {
     const auto errors = ComputePairErrors(WithoutNames(PosesOf(trajectories[name]["estimate"])),
                                           WithoutNames(PosesOf(trajectories[name]["reference"])));
     ASSERT_EQ(errors.size(), golden["rotation_deg"].size());

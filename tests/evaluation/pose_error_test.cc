@@ -183,7 +183,8 @@ TEST(ComparePoses, TurningOneViewShowsInItsRelativeRotationOnly) {
 
 TEST(ComparePoses, ErrorsOfViewsAgreeWithSciPy) {
   const nlohmann::json trajectories = ReadGolden("evo_trajectories")["cases"];
-  for (const auto& [name, golden] : ReadGolden("pair_accuracy")["cases"].items()) {
+  const nlohmann::json cases = ReadGolden("pair_accuracy")["cases"];
+  for (const auto& [name, golden] : cases.items()) {
     const auto comparison = ComparePoses(PosesOf(trajectories[name]["estimate"]),
                                          PosesOf(trajectories[name]["reference"]));
     ASSERT_TRUE(comparison);

@@ -28,7 +28,8 @@ void ExpectNear(const ErrorStatistics& actual,
 }
 
 TEST(TrajectoryError, AgreesWithEvo) {
-  for (const auto& [case_name, golden] : ReadGolden("evo_trajectories")["cases"].items()) {
+  const nlohmann::json cases = ReadGolden("evo_trajectories")["cases"];
+  for (const auto& [case_name, golden] : cases.items()) {
     const std::vector<NamedPose> estimate = PosesOf(golden["estimate"]);
     const std::vector<NamedPose> reference = PosesOf(golden["reference"]);
     for (const auto& [name, type] : kAlignments) {
