@@ -20,7 +20,8 @@ constexpr std::array kImporters = {&kColmapImporter,
                                    &kNpzFolderImporter,
                                    &kLlffImporter,
                                    &kTumImporter,
-                                   &kMonst3rImporter};
+                                   &kMonst3rImporter,
+                                   &kVggtLongImporter};
 
 struct Located {
   const Importer* importer = nullptr;

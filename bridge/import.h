@@ -20,7 +20,8 @@ enum class ImportFormat {
   kTum,        // trajectory "timestamp tx ty tz qx qy qz qw" (camera-to-world) + intrinsics
   kLlff,       // poses_bounds.npy
   kDa3Npz,     // results.npz of Depth Anything 3
-  kMonst3r     // folder of MonST3R or Easi3R: pred_traj.txt, pred_intrinsics.txt, frame_*.npy
+  kMonst3r,    // folder of MonST3R or Easi3R: pred_traj.txt, pred_intrinsics.txt, frame_*.npy
+  kVggtLong    // camera_poses.txt (and intrinsic.txt) of VGGT-Long
 };
 
 // How per-pixel maps relate to the original photos. kAuto is resolved from the sizes.

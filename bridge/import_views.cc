@@ -53,13 +53,17 @@ void ViewImport::Add(size_t photo_idx, NetworkView network_view) {
   prediction.view.name = photo.name;
   prediction.view.camera = *camera;
   prediction.view.cam_from_world = CamFromWorld(imported.pose, job_.options.repair);
-  prediction.view.network_width = geometry.network_width;
-  prediction.view.network_height = geometry.network_height;
-  prediction.view.original_from_network = geometry.original_from_network;
   prediction.depth = std::move(network_view.depth);
   prediction.depth_conf = std::move(network_view.depth_conf);
   prediction.distractor = std::move(network_view.distractor);
   prediction.points = std::move(network_view.points);
+  const bool has_maps = !prediction.depth.empty() || !prediction.depth_conf.empty() ||
+                        !prediction.distractor.empty() || !prediction.points.empty();
+  if (has_maps) {
+    prediction.view.network_width = geometry.network_width;
+    prediction.view.network_height = geometry.network_height;
+    prediction.view.original_from_network = geometry.original_from_network;
+  }
   ForgetBars(prediction);
   imported.anchors = MakeAnchors(geometry, prediction.points);
   sink_(std::move(imported));

@@ -60,5 +60,6 @@ extern const Importer kNpzFolderImporter;
 extern const Importer kTumImporter;
 extern const Importer kLlffImporter;
 extern const Importer kMonst3rImporter;
+extern const Importer kVggtLongImporter;
 
 }  // namespace vgtw

@@ -16,6 +16,7 @@ const std::map<std::string, ImportFormat> kFormats = {{"auto", ImportFormat::kAu
                                                       {"monst3r", ImportFormat::kMonst3r},
                                                       {"npz_folder", ImportFormat::kNpzFolder},
                                                       {"tum", ImportFormat::kTum},
+                                                      {"vggt_long", ImportFormat::kVggtLong},
                                                       {"vggt_npz", ImportFormat::kVggtNpz}};
 const std::map<std::string, ImportResize> kResizes = {{"auto", ImportResize::kAuto},
                                                       {"crop", ImportResize::kCrop},
