@@ -32,7 +32,7 @@ function linearTicks(high) {
 function axis(scale, layout, height, unit) {
   const marks = scale.ticks.map((tick, i) => {
     const x = layout.left + scale.at(tick) * layout.width;
-    const label = formatNumber(tick) + (i === scale.ticks.length - 1 && unit ? ` ${unit}` : '');
+    const label = formatTick(tick) + (i === scale.ticks.length - 1 && unit ? ` ${unit}` : '');
     return [
       svg('line', { class: 'grid', x1: x, x2: x, y1: 20, y2: height }),
       svg('text', { class: 'tick', x, y: 12, 'text-anchor': i === 0 ? 'start' : 'middle' }, label),
@@ -97,7 +97,7 @@ function drawHistogram(before, after, unit, total, label) {
     svg('line', { class: 'grid', x1: plot.left, x2: plot.right, y1: plot.bottom, y2: plot.bottom }),
     ticks.map((tick, k) => svg('text', {
       class: 'tick', x: x(tick), y: height - 8, 'text-anchor': k === 0 ? 'start' : k === 4 ? 'end' : 'middle',
-    }, formatNumber(Number(tick.toPrecision(3))) + (k === 4 && unit ? ` ${unit}` : ''))));
+    }, formatTick(tick) + (k === 4 && unit ? ` ${unit}` : ''))));
 }
 
 const legend = (pair, bars) => bars ? null : el('p', { class: 'legend' }, pair.map((modelIdx, k) => modelIdx < 0 ? null

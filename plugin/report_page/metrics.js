@@ -2,11 +2,11 @@
 // The figures: what they are called, their units, and which way is better (null: neither).
 
 const kModelFigures = [
-  { key: 'centre_rmse_percent', of: 'pose_error', label: 'Camera centres, error', unit: '%', better: 'lower',
+  { key: 'centre_rmse_percent', of: 'pose_error', label: 'Centre error', unit: '%', better: 'lower',
     help: 'RMSE against the reference, in % of the extent of its cameras' },
-  { key: 'rotation_median_deg', of: 'pose_error', label: 'Camera rotations, error', unit: '°', better: 'lower',
+  { key: 'rotation_median_deg', of: 'pose_error', label: 'Rotation error', unit: '°', better: 'lower',
     help: 'median of relative rotations against the reference, over pairs of photos' },
-  { key: 'direction_median_deg', of: 'pose_error', label: 'Directions, error', unit: '°', better: 'lower',
+  { key: 'direction_median_deg', of: 'pose_error', label: 'Direction error', unit: '°', better: 'lower',
     help: 'median of the directions from camera to camera against the reference' },
   { key: 'num_views', of: 'pose_error', label: 'Photos compared with the reference', unit: '', better: null },
   { key: 'held_out_px', label: 'Held-out error', unit: 'px', better: 'lower',
@@ -37,7 +37,7 @@ const kViewFigures = [
   { key: 'rotation_change_deg', label: 'Rotation, change', unit: '°', better: null },
   { key: 'centre_change_percent', label: 'Centre, change', unit: '%', better: null },
   { key: 'num_observations', label: 'Observations', unit: '', better: null },
-  { key: 'points_on_distractors', label: 'Points on distractors', unit: '', better: 'lower' },
+  { key: 'observations_on_distractors', label: 'Observations on distractors', unit: '', better: 'lower' },
   { key: 'coverage_percent', label: 'Photo area with points', unit: '%', better: 'higher' },
   { key: 'mean_track_length', label: 'Photos per point', unit: '', better: 'higher' },
   { key: 'median_angle_deg', label: 'Triangulation angle', unit: '°', better: 'higher' },
@@ -91,7 +91,7 @@ function direction(before, after, better) {
 }
 
 const kDirections = {
-  better: ['▲', 'better'], worse: ['▼', 'worse'], same: ['=', 'same'], more: ['↑', 'more'], fewer: ['↓', 'fewer'],
+  better: ['✓', 'better'], worse: ['✕', 'worse'], same: ['=', 'same'], more: ['↑', 'more'], fewer: ['↓', 'fewer'],
 };
 
 // "9.3 × lower", "14 % higher": what a reader would say.
@@ -99,10 +99,10 @@ function changeInWords(before, after) {
   if (!isNumber(before) || !isNumber(after) || before === after) return '';
   if (before === 0 || after === 0) return after > before ? `up from ${formatNumber(before)}` : 'down to none';
   const ratio = after / before;
-  if (ratio >= 2) return `${formatNumber(Number(ratio.toPrecision(2)))} × higher`;
-  if (ratio > 0 && ratio <= 0.5) return `${formatNumber(Number((1 / ratio).toPrecision(2)))} × lower`;
+  if (ratio >= 2) return `${formatTick(ratio, 2)}× higher`;
+  if (ratio > 0 && ratio <= 0.5) return `${formatTick(1 / ratio, 2)}× lower`;
   const percent = Math.abs(ratio - 1) * 100;
-  return `${formatNumber(Number(percent.toPrecision(2)))} % ${ratio > 1 ? 'higher' : 'lower'}`;
+  return `${formatTick(percent, 2)} % ${ratio > 1 ? 'higher' : 'lower'}`;
 }
 
 // The error that says most about a photo, and that most photos have.

@@ -17,14 +17,14 @@ function pairOfBars(before, after) {
 function figureCard(figure, before, after) {
   const verdict = direction(before, after, figure.better);
   const [sign, word] = kDirections[verdict] || [];
-  const unit = figure.unit === '°' ? '°' : figure.unit ? `\u00a0${figure.unit}` : '';
+  const { unit } = figure;
   return el('article', { class: 'card' },
     el('h3', { title: figure.help || null }, figure.label),
-    el('p', { class: 'values' }, isNumber(before) && [el('span', { class: 'was' }, formatNumber(before)), el('span', { class: 'arrow', 'aria-label': 'to' }, ' → ')],
-      el('strong', {}, formatNumber(after)), el('span', { class: 'unit' }, unit)),
+    el('p', { class: 'values' }, isNumber(before) && [el('span', { class: 'was' }, formatNumber(before)), el('span', { class: 'arrow' }, '→')],
+      el('strong', {}, formatNumber(after)), unit && el('span', { class: 'unit' }, unit)),
     isNumber(before) && pairOfBars(before, after),
     verdict && el('p', { class: `verdict ${verdict}` }, el('span', { 'aria-hidden': 'true' }, `${sign} `), `${word}`,
-      verdict === 'same' ? null : el('span', { class: 'help' }, ` · ${changeInWords(before, after)}`)));
+      verdict === 'same' ? null : el('span', { class: 'help' }, changeInWords(before, after))));
 }
 
 function showFigures() {
@@ -67,10 +67,11 @@ function showModels() {
   const row = (figure) => {
     const values = models.map((model) => modelValue(model, figure));
     const known = values.filter((value, i) => value !== null && models[i].role !== 'reference');
-    const best = known.length > 1 && figure.better ? Math[figure.better === 'lower' ? 'min' : 'max'](...known) : null;
-    const distinct = new Set(known).size > 1;
+    const top = known.length > 1 && figure.better ? Math[figure.better === 'lower' ? 'min' : 'max'](...known) : null;
+    const isTop = (value) => top !== null && direction(top, value, figure.better) === 'same';
+    const differ = !known.every(isTop);
     return el('tr', {}, el('th', { scope: 'row' }, figure.label, figure.help && el('span', { class: 'help' }, figure.help)),
-      values.map((value, i) => el('td', {}, distinct && value === best && models[i].role !== 'reference'
+      values.map((value, i) => el('td', {}, differ && isTop(value) && models[i].role !== 'reference'
         ? el('strong', {}, withUnit(value, figure.unit), el('span', { class: 'best' }, ' best')) : withUnit(value, figure.unit))));
   };
   byId('models').hidden = models.length === 0;

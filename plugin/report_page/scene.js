@@ -22,6 +22,44 @@ function worldFrame() {
   return { root, turn, radius };
 }
 
+// All cameras and most points (those within the middle nine tenths along each axis), in the world of
+// the screen: what one wants to see first.
+function mainSamples(root) {
+  root.updateMatrixWorld();
+  const toScreen = (point) => new THREE.Vector3(...point).applyMatrix4(root.matrixWorld);
+  const indices = models.map((model, i) => i);
+  const centres = indices.flatMap(camerasOf).map((camera) => toScreen(camera.centre));
+  let points = indices.flatMap((i) => (modelScene(i).points ? somePoints(modelScene(i).points, 1000) : [])).map(toScreen);
+  const bounds = ['x', 'y', 'z'].map((axis) => {
+    const sorted = points.map((point) => point[axis]).sort((a, b) => a - b);
+    return [axis, sorted[Math.floor(0.05 * sorted.length)], sorted[Math.floor(0.95 * sorted.length)]];
+  });
+  points = points.filter((point) => bounds.every(([axis, low, high]) => point[axis] >= low && point[axis] <= high));
+  return [...centres, ...points];
+}
+
+// Where to look at, and from how far in direction `toward`, to see all samples in the middle.
+function placeToSee(samples, toward, aspect) {
+  const right = new THREE.Vector3(0, 1, 0).cross(toward).normalize();
+  const up = toward.clone().cross(right);
+  const target = new THREE.Vector3();
+  for (const axis of [right, up, toward]) {
+    const along = samples.map((sample) => sample.dot(axis));
+    target.addScaledVector(axis, (Math.min(...along) + Math.max(...along)) / 2);
+  }
+  const distances = samples.map((sample) => {
+    const from = sample.clone().sub(target);
+    return from.dot(toward) + Math.max(Math.abs(from.dot(right)) / Math.max(1, aspect), Math.abs(from.dot(up))) / Math.tan(Math.PI / 8);
+  });
+  return { target, distance: 1.06 * Math.max(0.05, ...distances) };
+}
+
+const directionOf = (azimuth, elevation) => {
+  const a = (azimuth * Math.PI) / 180;
+  const e = (clamp(elevation, -89, 89) * Math.PI) / 180;
+  return new THREE.Vector3(Math.sin(a) * Math.cos(e), Math.sin(e), Math.cos(a) * Math.cos(e));
+};
+
 // From behind the cameras and a little aside where they look one way, else from the side above.
 function startingTurn(turn) {
   const cameras = camerasOf(Math.max(0, chosenPair()[1]));
@@ -29,15 +67,15 @@ function startingTurn(turn) {
   for (const camera of cameras) forward.add(new THREE.Vector3(0, 0, 1).applyQuaternion(quaternionOf(camera.rotation_wxyz)));
   forward.applyQuaternion(turn).divideScalar(Math.max(1, cameras.length));
   const level = Math.hypot(forward.x, forward.z);
-  if (level < 0.3) return [35, 30, 2.2];
-  return [(Math.atan2(-forward.x, -forward.z) * 180) / Math.PI + 28, 18, 2.0];
+  if (level < 0.3) return [35, 30];
+  return [(Math.atan2(-forward.x, -forward.z) * 180) / Math.PI + 28, 20];
 }
 
 class Stage {
   constructor(canvas, tip) {
     this.canvas = canvas;
     this.tip = tip;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));
     this.scene = new THREE.Scene();
     this.eye = new THREE.PerspectiveCamera(45, 1, 0.005, 100);
@@ -45,20 +83,31 @@ class Stage {
     this.scene.add(this.root);
     this.shown = [];  // { modelIdx, cameras, frusta } of what is on the screen
     this.selected = null;
+    this.samples = mainSamples(this.root);
     this.size = frustumSize(camerasOf(Math.max(0, chosenPair()[1])), this.radius);
     this.atlas = makeAtlas(() => this.draw());
     this.controls = new THREE.OrbitControls(this.eye, canvas);
     Object.assign(this.controls, { enableKeys: false, enableZoom: false, minDistance: 0.05, maxDistance: 20, rotateSpeed: 0.8 });
-    this.controls.addEventListener('change', () => { this.keepTurn(); this.draw(); });
+    this.controls.addEventListener('change', () => this.draw());
+    this.controls.addEventListener('end', () => this.keepTurn());
     this.look();
   }
 
-  // The direction of view: [azimuth, elevation, distance], in degrees and radii.
-  look(turn = state.turn.split(',').map(Number)) {
-    const [azimuth, elevation, distance] = turn.length === 3 && turn.every(Number.isFinite) ? turn : startingTurn(this.turn);
-    const a = (azimuth * Math.PI) / 180;
-    const e = (clamp(elevation, -89, 89) * Math.PI) / 180;
-    this.eye.position.set(Math.sin(a) * Math.cos(e), Math.sin(e), Math.cos(a) * Math.cos(e)).multiplyScalar(distance).add(this.controls.target);
+  // Looks as the state says: azimuth and elevation (degrees), then distance and the point looked at;
+  // where it says less, so that everything is seen.
+  look() {
+    const given = state.turn === '' ? [] : state.turn.split(',').map(Number);
+    const known = given.every(Number.isFinite) ? given : [];
+    const [azimuth, elevation] = known.length >= 2 ? known : startingTurn(this.turn);
+    const toward = directionOf(azimuth, elevation);
+    const { target, distance } = placeToSee(this.samples, toward, this.eye.aspect);
+    if (known.length === 6) this.lookFrom(toward, known[2], new THREE.Vector3(...known.slice(3)));
+    else this.lookFrom(toward, distance, target);
+  }
+
+  lookFrom(toward, distance, target = this.controls.target) {
+    this.controls.target.copy(target);
+    this.eye.position.copy(toward).multiplyScalar(clamp(distance, 0.05, 20)).add(target);
     this.controls.update();
     this.draw();
   }
@@ -69,20 +118,24 @@ class Stage {
     return [(Math.atan2(offset.x, offset.z) * 180) / Math.PI, (Math.asin(clamp(offset.y / distance, -1, 1)) * 180) / Math.PI, distance];
   }
 
+  // After a pause, because browsers limit how often an address may change.
   keepTurn() {
     clearTimeout(this.turnTimer);
-    this.turnTimer = setTimeout(() => changeState({ turn: this.currentTurn().map((v) => v.toFixed(2)).join(',') }), 200);
+    this.turnTimer = setTimeout(() => {
+      changeState({ turn: [...this.currentTurn(), ...this.controls.target.toArray()].map((v) => v.toFixed(3)).join(',') });
+    }, 250);
   }
 
   turnBy(azimuth, elevation, zoom = 1) {
     const [a, e, d] = this.currentTurn();
-    this.look([a + azimuth, e + elevation, d * zoom]);
+    this.lookFrom(directionOf(a + azimuth, e + elevation), d * zoom);
+    this.keepTurn();
   }
 
   reset() {
-    this.controls.target.set(0, 0, 0);
+    changeState({ turn: '' });
     this.selected = null;
-    this.look(startingTurn(this.turn));
+    this.look();
     this.build();
   }
 
@@ -119,7 +172,7 @@ class Stage {
   }
 
   pointSize(count) {
-    return (Number(state.points) || (count > 50000 ? 1.5 : 2.5)) * this.renderer.getPixelRatio();
+    return (Number(state.points) || defaultPointSize(count)) * this.renderer.getPixelRatio();
   }
 
   addMoves(before, after) {
@@ -201,7 +254,8 @@ class Stage {
     // A tall, narrow canvas must not cut the scene at its sides.
     this.eye.fov = width < height ? (2 * Math.atan((Math.tan(Math.PI / 8) * height) / width) * 180) / Math.PI : 45;
     this.eye.updateProjectionMatrix();
-    this.draw();
+    if (state.turn.split(',').length < 3) this.look();
+    this.renderer.render(this.scene, this.eye);  // at once: the new size has cleared the canvas
   }
 
   draw() {
@@ -215,6 +269,8 @@ class Stage {
     return this.canvas.toDataURL('image/png');
   }
 }
+
+const defaultPointSize = (count) => (count > 50000 ? 1.5 : count > 10000 ? 2.5 : 3.5);
 
 function shiftOf(camera, anchor, factor) {
   if (!anchor || !factor) return new THREE.Vector3();

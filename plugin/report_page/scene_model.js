@@ -35,14 +35,29 @@ function frustaLines(frusta, color) {
   return lines(vectors, color);
 }
 
+// Three numbers a point: each is stored as 16 bits, x = min + step * q.
+function pointPositions(points) {
+  const xyz = decodeBase64(points.xyz);
+  const bits = new DataView(xyz.buffer);
+  const positions = new Float32Array(Math.min(points.count, Math.floor(xyz.length / 6)) * 3);
+  for (let i = 0; i < positions.length; ++i) positions[i] = points.min[i % 3] + points.step[i % 3] * bits.getUint16(i * 2, true);
+  return positions;
+}
+
+// At most `count` of the points, evenly chosen.
+function somePoints(points, count) {
+  const positions = pointPositions(points);
+  const stride = 3 * Math.max(1, Math.floor(positions.length / 3 / count));
+  const chosen = [];
+  for (let i = 0; i < positions.length; i += stride) chosen.push([positions[i], positions[i + 1], positions[i + 2]]);
+  return chosen;
+}
+
 // The points, each with its own colour, or all with `color`.
 function pointCloud(points, color, size) {
-  const xyz = decodeBase64(points.xyz);
+  const positions = pointPositions(points);
   const rgb = decodeBase64(points.rgb);
-  const count = Math.min(points.count, Math.floor(xyz.length / 6));
-  const view = new DataView(xyz.buffer);
-  const positions = new Float32Array(count * 3);
-  for (let i = 0; i < count * 3; ++i) positions[i] = points.min[i % 3] + points.step[i % 3] * view.getUint16(i * 2, true);
+  const count = positions.length / 3;
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
   const colored = !color && rgb.length >= count * 3;
@@ -110,7 +125,7 @@ function frustumSize(cameras, radius) {
     centres.forEach((q, j) => { if (i !== j) best = Math.min(best, Math.hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2])); });
     return best;
   });
-  return clamp((median(nearest) || 0.2 * radius) * 0.55, 0.015 * radius, 0.12 * radius);
+  return clamp((median(nearest) || 0.2 * radius) * 0.6, 0.03 * radius, 0.15 * radius);
 }
 
 function disposeAll(group) {

@@ -40,6 +40,9 @@ function formatNumber(value) {
   return size >= 10 ? value.toFixed(1) : size >= 1 ? value.toFixed(2) : value.toFixed(3);
 }
 
+// Without zeros at the end, for axes and ratios.
+const formatTick = (value, digits = 3) => Number(value.toPrecision(digits)).toLocaleString('en-US', { maximumFractionDigits: 12 });
+
 const withUnit = (value, unit) =>
   isNumber(value) && unit ? `${formatNumber(value)}\u00a0${unit}` : formatNumber(value);
 
