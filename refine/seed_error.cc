@@ -6,12 +6,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 namespace vgtw {
 namespace {
 
 constexpr size_t kMaxTracks = 4000;
+// So many tracks of three views speak for all.
+constexpr size_t kMinLongTracks = 30;
 // Poses that are farther off are of no use to begin with.
 constexpr double kWorstErrorDeg = 15.0;
 // Errors beyond so many medians are those of wrong matches: of normal errors in two dimensions 1 in
@@ -27,18 +30,31 @@ double PixelsOfAngle(const Reconstruction& model, double angle_deg) {
   return focal_length * std::tan(angle_deg * std::numbers::pi / 180.0);
 }
 
+// Sorts long tracks first. Returns how many observations, from the first on, tell the error.
+size_t PutLongTracksFirst(std::vector<Track>& tracks) {
+  std::stable_sort(tracks.begin(), tracks.end(), [](const Track& a, const Track& b) {
+    return a.size() > b.size();
+  });
+  if (tracks.size() > kMaxTracks) tracks.resize(kMaxTracks);
+  size_t num_long_tracks = 0;
+  size_t num_of_long = 0;
+  size_t num_of_all = 0;
+  for (const Track& track : tracks) {
+    num_of_all += track.size();
+    if (track.size() < 3) continue;
+    ++num_long_tracks;
+    num_of_long += track.size();
+  }
+  return num_long_tracks < kMinLongTracks ? num_of_all : num_of_long;
+}
+
 }  // namespace
 
 SeedError MeasureSeedError(const Reconstruction& model,
                            const std::vector<Track>& tracks,
                            int num_threads) {
   std::vector<Track> longest = tracks;
-  if (longest.size() > kMaxTracks) {
-    std::stable_sort(longest.begin(), longest.end(), [](const Track& a, const Track& b) {
-      return a.size() > b.size();
-    });
-    longest.resize(kMaxTracks);
-  }
+  const size_t num_telling = PutLongTracksFirst(longest);
   SeedError error;
   error.max_px = PixelsOfAngle(model, kWorstErrorDeg);
   for (const auto& [id, image] : model.images) error.max_px_by_image[id] = error.max_px;
@@ -47,7 +63,7 @@ SeedError MeasureSeedError(const Reconstruction& model,
   for (int i = 0; i < kNumPasses; ++i) {
     const HeldOutJudge judge(longest, error.max_px / kMaxMedians, 2.0 * worst_px, num_threads);
     const HeldOutJudge::Errors errors = judge.Measure(model);
-    error.median_px = Median(errors);
+    error.median_px = Median({errors.begin(), std::next(errors.begin(), num_telling)});
     error.max_px = std::clamp(kMaxMedians * error.median_px, 1.0, worst_px);
     for (const auto& [id, median_px] : judge.MedianPxByImage(errors)) {
       error.max_px_by_image[id] = std::clamp(kMaxMedians * median_px, error.max_px, worst_px);

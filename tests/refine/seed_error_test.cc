@@ -115,6 +115,23 @@ TEST(MeasureSeedError, LongTracksSpeakFirst) {
   EXPECT_LT(MeasureSeedError(model, tracks, 1).median_px, 1e-6);
 }
 
+TEST(MeasureSeedError, PairsDoNotHideTheErrorThatLongTracksShow) {
+  SyntheticModelOptions options;
+  options.num_images = 10;
+  options.num_points = 1000;
+  const Reconstruction truth = MakeSyntheticModel(options);
+  Reconstruction model = truth;
+  PerturbPoses(model, 1.0, 0.01, 5);
+  std::vector<Track> tracks = TracksOf(model);
+  for (size_t i = 0; i + 40 < tracks.size(); ++i) tracks[i].resize(2);
+  const double true_px = TrueErrorPx(truth, model);
+  EXPECT_GT(MeasureSeedError(model, tracks, 1).median_px, 0.5 * true_px);
+  EXPECT_LT(MeasureSeedError(model, tracks, 1).median_px, 1.2 * true_px);
+  // Of pairs alone the part along the epipolar line cannot be seen.
+  tracks.resize(tracks.size() - 40);
+  EXPECT_LT(MeasureSeedError(model, tracks, 1).median_px, 0.5 * true_px);
+}
+
 TEST(MeasureSeedError, IsBoundedAndIndependentOfThreads) {
   Reconstruction model = MakeSyntheticModel({});
   PerturbPoses(model, 60.0, 3.0, 4);
