@@ -18,8 +18,8 @@ struct SeedError {
 };
 
 // At most some thousand tracks are looked at, long ones first, because of two rays only the part
-// across the epipolar line can be seen: where there are enough of three, the views together have the
-// error of these alone.
+// across the epipolar line can be seen: where there are enough of three, the views together have
+// the error of these alone.
 SeedError MeasureSeedError(const Reconstruction& model,
                            const std::vector<Track>& tracks,
                            int num_threads);
