@@ -23,7 +23,7 @@ function makeScale(values) {
 function linearTicks(high) {
   const rough = high / 4;
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 2.5, 5, 10].map((m) => m * power).find((s) => s >= rough) || rough;
+  const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= rough) || rough;
   const ticks = [];
   for (let k = 0; k * step <= high * 1.04; ++k) ticks.push(Number((k * step).toPrecision(6)));
   return ticks;
@@ -90,14 +90,14 @@ function drawHistogram(before, after, unit, total, label) {
   const y = (count) => plot.bottom - (count / most) * (plot.bottom - plot.top);
   const outline = (h) => h.counts.reduce(
     (path, count, i) => `${path}V${y(count)}H${x(h.first + h.step * (i + 1))}`, `M${x(h.first)} ${plot.bottom}`) + `V${plot.bottom}`;
-  const ticks = [0, 1, 2, 3, 4].map((k) => low + ((high - low) * k) / 4);
+  const ticks = linearTicks(high).filter((tick) => tick >= low && tick <= high);
   return svg('svg', { class: 'chart', role: 'img', 'aria-label': label, width: total, height, viewBox: `0 0 ${total} ${height}` },
     before && svg('path', { class: 'steps before', d: outline(before) }),
     after && svg('path', { class: 'steps after', d: outline(after) }),
     svg('line', { class: 'grid', x1: plot.left, x2: plot.right, y1: plot.bottom, y2: plot.bottom }),
     ticks.map((tick, k) => svg('text', {
-      class: 'tick', x: x(tick), y: height - 8, 'text-anchor': k === 0 ? 'start' : k === 4 ? 'end' : 'middle',
-    }, formatTick(tick) + (k === 4 && unit ? ` ${unit}` : ''))));
+      class: 'tick', x: x(tick), y: height - 8, 'text-anchor': x(tick) < 30 ? 'start' : x(tick) > total - 40 ? 'end' : 'middle',
+    }, formatTick(tick) + (k === ticks.length - 1 && unit ? ` ${unit}` : ''))));
 }
 
 const legend = (pair, bars) => bars ? null : el('p', { class: 'legend' }, pair.map((modelIdx, k) => modelIdx < 0 ? null
@@ -144,6 +144,10 @@ function histogramChart(key, unit, title, words) {
 function showPlots() {
   const [before, after] = chosenPair();
   const pair = before < 0 ? '' : `${models[before].name} to ${models[after].name}`;
+  const histograms = [
+    histogramChart('error_histogram', 'px', 'Reprojection errors', 'How many observations have which error.'),
+    histogramChart('track_histogram', 'photos', 'Track lengths', 'How many points are seen in how many photos.'),
+  ].filter(Boolean);
   const charts = after < 0 ? [] : [
     viewChart(errorKey, errorKey === 'held_out_px' ? 'Held-out error of each photo' : 'Reprojection error of each photo',
       `${errorKey === 'held_out_px' ? 'Robust mean' : 'Median'}, in pixels of the photo; the worst first. Further left is better.`),
@@ -151,8 +155,7 @@ function showPlots() {
     viewChart('centre_change_percent', 'How far each camera moved', `From ${pair}, after alignment, in % of the cameras’ extent.`, true),
     viewChart('rotation_error_deg', 'Rotation against the reference', 'Error of each camera in degrees, after alignment.'),
     viewChart('centre_error_percent', 'Centre against the reference', 'Error of each camera, after alignment, in % of the cameras’ extent.'),
-    histogramChart('error_histogram', 'px', 'Reprojection errors', 'How many observations have which error.'),
-    histogramChart('track_histogram', 'photos', 'Track lengths', 'How many points are seen in how many photos.'),
+    histograms.length > 0 && el('div', { class: 'stack' }, histograms),
   ].filter(Boolean);
   byId('plots').hidden = charts.length === 0;
   put(byId('plots'), el('h2', { id: 'plots-title' }, 'Photo by photo'), el('div', { class: 'charts' }, charts));

@@ -36,7 +36,8 @@ function formatNumber(value) {
   if (Number.isInteger(value)) return value.toLocaleString('en-US');
   const size = Math.abs(value);
   if (size >= 100) return Math.round(value).toLocaleString('en-US');
-  if (size > 0 && size < 0.001) return value.toPrecision(1);
+  if (size < 1e-6) return '0';
+  if (size < 0.001) return value.toPrecision(1);
   return size >= 10 ? value.toFixed(1) : size >= 1 ? value.toFixed(2) : value.toFixed(3);
 }
 
