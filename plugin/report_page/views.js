@@ -73,7 +73,7 @@ function gridControls() {
 }
 
 const overlayLegend = () => views.some((view) => view.overlay) && el('p', { class: 'legend overlay-legend' },
-  el('span', {}, el('span', { class: 'swatch excluded', 'aria-hidden': 'true' }), 'red: excluded by the mask'),
+  el('span', {}, el('span', { class: 'swatch excluded', 'aria-hidden': 'true' }), 'magenta: excluded by the mask'),
   el('span', {}, el('span', { class: 'dot kept', 'aria-hidden': 'true' }), 'green: features that the model uses'));
 
 // All figures as a table, for screen readers, for copying, and for who wants them exactly.
