@@ -91,6 +91,16 @@ void RoundLimits::Tighten(const std::map<ImageId, double>& median_px) {
   }
 }
 
+bool RoundLimits::Widen() {
+  bool has_changed = false;
+  for (auto& [id, limit_px] : max_error_px) {
+    if (limit_px >= worst_px) continue;
+    limit_px = std::min(2.0 * limit_px, worst_px);
+    has_changed = true;
+  }
+  return has_changed;
+}
+
 BundleAdjustmentOptions AdjustmentOf(const RefineModelOptions& options,
                                      const Reconstruction& model,
                                      const BundlePriors& priors) {

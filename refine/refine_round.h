@@ -12,15 +12,18 @@
 namespace vgtw {
 
 // How far off observations may reproject, per image: some views of a seed are farther off than
-// others. Limits only become tighter.
+// others. Limits only become tighter once something was adjusted.
 struct RoundLimits {
   std::map<ImageId, double> max_error_px;
   double final_px = 0.0;  // where they end
+  double worst_px = 0.0;  // as far as they are widened
 
   double MedianPx() const;
   bool IsFinal() const { return MedianPx() <= final_px; }
   // After an adjustment that left these median errors.
   void Tighten(const std::map<ImageId, double>& median_px);
+  // Doubles them. Whether any changed.
+  bool Widen();
   bool operator==(const RoundLimits&) const = default;
 };
 

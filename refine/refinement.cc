@@ -253,6 +253,14 @@ bool Refinement::RunRound(RoundLimits& limits) {
   return has_gained;
 }
 
+// Robust points may follow two of three views and hide what the third is off: limits are too tight
+// then for points of three views.
+bool Refinement::HasFoundNothing() const {
+  return std::all_of(rounds_.begin(), rounds_.end(), [](const RefineRound& round) {
+    return round.num_points3D == 0;
+  });
+}
+
 bool Refinement::AreIntrinsicsWeak() const {
   const Reconstruction model = TriangulateAll(good_.model);
   const Uncertainty uncertainty =
@@ -317,9 +325,10 @@ Reconstruction Refinement::PutBackUnsupported() {
 }
 
 RoundLimits Refinement::FirstLimits() const {
+  const SeedError error = MeasureSeedError(seed_, split_.adjusted, options_.num_threads);
   RoundLimits limits;
   limits.final_px = options_.max_error_px;
-  const SeedError error = MeasureSeedError(seed_, split_.adjusted, options_.num_threads);
+  limits.worst_px = error.worst_px;
   for (const auto& [id, max_px] : error.max_px_by_image) {
     limits.max_error_px[id] = std::max(max_px, limits.final_px);
   }
@@ -346,7 +355,7 @@ RefineModelResult Refinement::Run() {
     const RoundLimits before_round = limits;
     const bool has_gained = RunRound(limits);
     // The same again would come of the same limits and poses.
-    if (!has_gained && limits == before_round) break;
+    if (!has_gained && limits == before_round && !(HasFoundNothing() && limits.Widen())) break;
   }
   if (!IsLate()) TryFewerIntrinsics(limits);
   result.is_out_of_time = IsLate();

@@ -59,6 +59,8 @@ class Refinement {
   void TryFewerIntrinsics(const RoundLimits& limits);
   // One round, repeated without the views that it leaves worse. Whether it is worth another one.
   bool RunRound(RoundLimits& limits);
+  // Whether no round came to a model.
+  bool HasFoundNothing() const;
   // Views of an adjusted model that are worse than before.
   std::set<ImageId> FindWorseViews(const Judged& candidate, const RoundOutcome& outcome) const;
   // Those that turned too far to be believed, and why.

@@ -15,7 +15,6 @@ namespace {
 constexpr size_t kMaxTracks = 4000;
 // So many tracks of three views speak for all.
 constexpr size_t kMinLongTracks = 30;
-// Poses that are farther off are of no use to begin with.
 constexpr double kWorstErrorDeg = 15.0;
 // Errors beyond so many medians are those of wrong matches: of normal errors in two dimensions 1 in
 // 10^10 is.
@@ -56,17 +55,18 @@ SeedError MeasureSeedError(const Reconstruction& model,
   std::vector<Track> longest = tracks;
   const size_t num_telling = PutLongTracksFirst(longest);
   SeedError error;
-  error.max_px = PixelsOfAngle(model, kWorstErrorDeg);
+  error.worst_px = PixelsOfAngle(model, kWorstErrorDeg);
+  error.max_px = error.worst_px;
   for (const auto& [id, image] : model.images) error.max_px_by_image[id] = error.max_px;
   if (longest.empty()) return error;
-  const double worst_px = error.max_px;
   for (int i = 0; i < kNumPasses; ++i) {
-    const HeldOutJudge judge(longest, error.max_px / kMaxMedians, 2.0 * worst_px, num_threads);
+    const HeldOutJudge judge(
+        longest, error.max_px / kMaxMedians, 2.0 * error.worst_px, num_threads);
     const HeldOutJudge::Errors errors = judge.Measure(model);
     error.median_px = Median({errors.begin(), std::next(errors.begin(), num_telling)});
-    error.max_px = std::clamp(kMaxMedians * error.median_px, 1.0, worst_px);
+    error.max_px = std::clamp(kMaxMedians * error.median_px, 1.0, error.worst_px);
     for (const auto& [id, median_px] : judge.MedianPxByImage(errors)) {
-      error.max_px_by_image[id] = std::clamp(kMaxMedians * median_px, error.max_px, worst_px);
+      error.max_px_by_image[id] = std::clamp(kMaxMedians * median_px, error.max_px, error.worst_px);
     }
   }
   return error;

@@ -14,6 +14,7 @@ namespace vgtw {
 struct SeedError {
   double median_px = 0.0;  // of observations from the points that fit their tracks best
   double max_px = 0.0;     // of the views together
+  double worst_px = 0.0;   // bound of all; poses that are farther off are of no use to begin with
   std::map<ImageId, double> max_px_by_image;  // of each, at least max_px: views may be far off
 };
 

@@ -325,6 +325,24 @@ TEST(RefineModel, OfTwoViews) {
       1e-3);
 }
 
+// Here points follow two views and hide what the third is off: what is measured of the seed is a
+// quarter of the limit by which points of three views pass.
+TEST(RefineModel, WidensLimitsByWhichNothingPasses) {
+  SyntheticModelOptions options = Scene();
+  options.num_images = 3;
+  options.seed = 36;
+  Reconstruction truth = MakeSyntheticModel(options);
+  ProjectAgain(truth, 0.3, 36);
+  Reconstruction start = truth;
+  PerturbPoses(start, 3.0, 0.33, 36);
+  const RefineModelResult result = RefineModel({}, start, TracksOf(truth));
+  EXPECT_EQ(result.rounds[0].num_points3D, 0u);
+  EXPECT_NEAR(result.rounds[1].max_error_px, 2.0 * result.rounds[0].max_error_px, 1e-9);
+  for (const auto& [id, view] : result.views) EXPECT_EQ(view.outcome, ViewOutcome::kRefined);
+  // As much as is held out of the noise.
+  EXPECT_LT(result.held_out_after_px, 0.35);
+}
+
 TEST(RefineModel, OfAPlanarScene) {
   SyntheticModelOptions options = Scene();
   options.planar = true;

@@ -50,7 +50,7 @@ TEST(NumSupportingObservations, OfTwoImagesEveryPointCounts) {
   EXPECT_EQ(NumSupportingObservations(model), (std::map<ImageId, size_t>{{1, 2}, {2, 2}}));
 }
 
-TEST(RoundLimits, OnlyBecomeTighter) {
+TEST(RoundLimits, BecomeTighter) {
   RoundLimits limits;
   limits.final_px = 4.0;
   limits.max_error_px = {{1, 60.0}, {2, 30.0}, {3, 5.0}};
@@ -63,6 +63,16 @@ TEST(RoundLimits, OnlyBecomeTighter) {
   EXPECT_EQ(limits.MedianPx(), 4.0);
   EXPECT_TRUE(limits.IsFinal());
   EXPECT_TRUE(RoundLimits{}.IsFinal());
+}
+
+TEST(RoundLimits, AreWidenedUpToTheWorst) {
+  RoundLimits limits;
+  limits.worst_px = 50.0;
+  limits.max_error_px = {{1, 60.0}, {2, 30.0}, {3, 5.0}};
+  EXPECT_TRUE(limits.Widen());
+  EXPECT_EQ(limits.max_error_px, (std::map<ImageId, double>{{1, 60.0}, {2, 50.0}, {3, 10.0}}));
+  limits.max_error_px.erase(3);
+  EXPECT_FALSE(limits.Widen());
 }
 
 TEST(RunRefineRound, AdjustsFromTracksAlone) {
