@@ -206,10 +206,12 @@ json Pipeline::CheckFeatures(const fs::path& database_path, const std::string& l
     if (image.num_keypoints > 0) ++num_images;
   }
   if (num_images < 2) {
-    Fail(workspace_.log("features"),
-         std::to_string(num_images) + " photos have features",
+    Fail(options_.image_path,
+         std::to_string(num_images) + " photos have features that masks keep",
          "at least 2",
-         "colmap said: " + last_words);
+         last_words.empty()
+             ? "a lower --mask_margin_scales keeps more; 'vgtw mask lint' tells specks in masks"
+             : "colmap said: " + last_words);
   }
   if (num_excluded > 0) {
     Fail(workspace_.log("features"),
