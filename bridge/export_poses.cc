@@ -22,13 +22,6 @@ std::string Text(double value) {
   return {buffer.data(), result.ptr};
 }
 
-Eigen::Matrix<double, 3, 4> WorldFromCam(const View& view) {
-  Eigen::Matrix<double, 3, 4> matrix;
-  matrix.leftCols<3>() = view.cam_from_world.rotation.conjugate().toRotationMatrix();
-  matrix.col(3) = OriginInSource(view.cam_from_world);
-  return matrix;
-}
-
 struct ModelWords {
   CameraModel model;
   const char* name;                         // nerfstudio's
@@ -74,11 +67,10 @@ json Lens(const View& view) {
 std::string TumTrajectory(const std::vector<View>& views, TrajectoryLabel label) {
   std::string text = "# world_from_cam: label tx ty tz qx qy qz qw\n";
   for (size_t i = 0; i < views.size(); ++i) {
-    const Eigen::Quaterniond rotation = views[i].cam_from_world.rotation.conjugate();
-    const Eigen::Vector3d centre = OriginInSource(views[i].cam_from_world);
+    const Rigid3d world_from_cam = Inverse(views[i].cam_from_world);
     text += label == TrajectoryLabel::kLine ? std::to_string(i) : views[i].name;
-    for (const double value : centre) text += " " + Text(value);
-    for (const double value : rotation.coeffs()) text += " " + Text(value);
+    for (const double value : world_from_cam.translation) text += " " + Text(value);
+    for (const double value : world_from_cam.rotation.coeffs()) text += " " + Text(value);
     text += "\n";
   }
   return text;
@@ -87,7 +79,7 @@ std::string TumTrajectory(const std::vector<View>& views, TrajectoryLabel label)
 std::string KittiTrajectory(const std::vector<View>& views) {
   std::string text;
   for (const View& view : views) {
-    const Eigen::Matrix<double, 3, 4> matrix = WorldFromCam(view);
+    const Eigen::Matrix<double, 3, 4> matrix = Inverse(view.cam_from_world).ToMatrix();
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 4; ++column) {
         text += (row + column > 0 ? " " : "") + Text(matrix(row, column));
@@ -101,7 +93,7 @@ std::string KittiTrajectory(const std::vector<View>& views) {
 std::string TransformsJson(const std::vector<View>& views, const std::string& image_folder) {
   json frames = json::array();
   for (const View& view : views) {
-    Eigen::Matrix<double, 3, 4> matrix = WorldFromCam(view);
+    Eigen::Matrix<double, 3, 4> matrix = Inverse(view.cam_from_world).ToMatrix();
     matrix.col(1) = -matrix.col(1);
     matrix.col(2) = -matrix.col(2);
     json rows = json::array();
