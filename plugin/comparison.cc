@@ -151,7 +151,6 @@ class Comparison {
   void MeasureHeldOut() {
     if (inputs_.database_path.empty()) return;
     const ColmapDatabase database(inputs_.database_path, ColmapDatabase::Mode::kReadOnly);
-    std::vector<Reconstruction> models;
     std::set<ImageId> common;
     for (const auto& [id, image] : inputs_.models.front().model.images) common.insert(id);
     for (const ComparedModel& compared : inputs_.models) {
@@ -160,11 +159,10 @@ class Comparison {
                          inputs_.database_path.string() + ": tracks held out are left out");
         return;
       }
-      models.push_back(compared.model);
       std::erase_if(common, [&](ImageId id) { return !compared.model.images.contains(id); });
     }
-    std::vector<Track> tracks;
-    for (Reconstruction& model : models) tracks = ReadTracks(database, model);
+    Reconstruction first = inputs_.models.front().model;
+    std::vector<Track> tracks = ReadTracks(database, first);
     for (Track& track : tracks) {
       std::erase_if(
           track, [&](const TrackElement& element) { return !common.contains(element.image_id); });
@@ -175,7 +173,14 @@ class Comparison {
         1.0,
         inputs_.held_out_max_px,
         inputs_.num_threads);
-    for (const Reconstruction& model : models) {
+    for (const ComparedModel& compared : inputs_.models) {
+      // The judge wants poses, cameras and the keypoints that tracks name.
+      Reconstruction model;
+      model.cameras = compared.model.cameras;
+      for (const ImageId id : common) {
+        Image& image = model.images[id] = compared.model.images.at(id);
+        image.points2D = first.images.at(id).points2D;
+      }
       const HeldOutJudge::Errors errors = judge.Measure(model);
       held_out_.mean_px.push_back(judge.MeanPx(errors));
       held_out_.mean_px_by_image.push_back(judge.MeanPxByImage(errors));
