@@ -8,6 +8,7 @@
 #include "bridge/point_cloud.h"
 #include "bridge/predictions.h"
 #include "plugin/colmap.h"
+#include "plugin/comparison_pictures.h"
 #include "plugin/database_tracks.h"
 #include "plugin/feature_stage.h"
 #include "plugin/hashing.h"
@@ -305,8 +306,9 @@ void Pipeline::Refine() {
 }
 
 PipelineReport Pipeline::Report() {
-  WriteReportPage(workspace_, options_);
-  PipelineReport report = MakeReport(workspace_, options_);
+  const ComparisonInputs run = ReadRun(workspace_, options_);
+  WriteComparisonPage(workspace_.report(), run, CompareModels(run));
+  PipelineReport report = MakeReport(workspace_, run);
   report.notes.insert(report.notes.begin(), notes_.begin(), notes_.end());
   workspace_.Record("report", AsJson(report));
   return report;

@@ -3,8 +3,6 @@
 
 #include "bridge/colmap_model.h"
 #include "bridge/pose_files.h"
-#include "plugin/comparison.h"
-#include "plugin/comparison_pictures.h"
 #include "plugin/refine_report.h"
 #include "plugin/table.h"
 
@@ -156,39 +154,38 @@ json AsJson(const PipelineReport& report) {
   return object;
 }
 
-PipelineReport MakeReport(const Workspace& workspace, const PipelineOptions& options) {
-  const Reconstruction feedforward = ReadModel(workspace.feedforward());
-  const Reconstruction refined = ReadModel(workspace.refined());
+ComparisonInputs ReadRun(const Workspace& workspace, const PipelineOptions& options) {
+  ComparisonInputs run;
+  run.models = {{"feed-forward", workspace.feedforward(), ReadModel(workspace.feedforward())},
+                {"refined", workspace.refined(), ReadModel(workspace.refined())}};
+  run.reference_path = options.reference_path;
+  if (!options.reference_path.empty()) run.reference = ReadPoses(options.reference_path);
+  run.image_path = options.image_path;
+  if (options.use_masks) run.mask_path = workspace.masks();
+  run.database_path = workspace.database();
+  UseRunRecord(workspace.record(), run);
+  run.title = options.output_path.string();
+  run.command = "vgtw run";
+  run.num_threads = options.num_threads;
+  return run;
+}
+
+PipelineReport MakeReport(const Workspace& workspace, const ComparisonInputs& run) {
+  const Reconstruction& feedforward = run.models.front().model;
+  const Reconstruction& refined = run.models.back().model;
   PipelineReport report;
   const json& stages = workspace.record().at("stages");
   report.views = ReportViews(stages, feedforward, refined);
   report.feedforward = ComputeReprojectionStats(feedforward);
   report.refined = ComputeReprojectionStats(refined);
   report.num_matched_pairs = stages.at("matches").at("result").at("num_verified_pairs");
-  if (options.reference_path.empty()) return report;
-  const auto reference = ReadPoses(options.reference_path);
-  report.feedforward_error = ComparePoses(CamFromWorldByName(feedforward), reference);
-  report.refined_error = ComparePoses(CamFromWorldByName(refined), reference);
+  if (run.reference_path.empty()) return report;
+  report.feedforward_error = ComparePoses(CamFromWorldByName(feedforward), run.reference);
+  report.refined_error = ComparePoses(CamFromWorldByName(refined), run.reference);
   if (!report.refined_error) {
     report.notes.push_back("the reference shares fewer than 3 views in general position");
   }
   return report;
-}
-
-void WriteReportPage(const Workspace& workspace, const PipelineOptions& options) {
-  ComparisonInputs inputs;
-  inputs.models = {{"feed-forward", workspace.feedforward(), ReadModel(workspace.feedforward())},
-                   {"refined", workspace.refined(), ReadModel(workspace.refined())}};
-  inputs.reference_path = options.reference_path;
-  if (!options.reference_path.empty()) inputs.reference = ReadPoses(options.reference_path);
-  inputs.image_path = options.image_path;
-  if (options.use_masks) inputs.mask_path = workspace.masks();
-  inputs.database_path = workspace.database();
-  UseRunRecord(workspace.record(), inputs);
-  inputs.title = options.output_path.string();
-  inputs.command = "vgtw run";
-  inputs.num_threads = options.num_threads;
-  WriteComparisonPage(workspace.report(), inputs, CompareModels(inputs));
 }
 
 std::string FormatReport(const PipelineReport& report) {

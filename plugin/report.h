@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "plugin/comparison.h"
 #include "plugin/pipeline.h"
 #include "plugin/workspace.h"
 
@@ -18,10 +19,10 @@ nlohmann::json AsJson(const ReprojectionStats& stats);
 nlohmann::json AsJson(const PoseComparison& comparison);
 nlohmann::json AsJson(const PipelineReport& report);
 
-// Reads the two models of a finished workspace and says what each photo and each step brought.
-PipelineReport MakeReport(const Workspace& workspace, const PipelineOptions& options);
+// The two models of a finished workspace, feed-forward and refined, and what they are compared by.
+ComparisonInputs ReadRun(const Workspace& workspace, const PipelineOptions& options);
 
-// Writes report.html of a finished workspace: its two models side by side (plugin/comparison.h).
-void WriteReportPage(const Workspace& workspace, const PipelineOptions& options);
+// Says what each photo and each step of a run brought.
+PipelineReport MakeReport(const Workspace& workspace, const ComparisonInputs& run);
 
 }  // namespace vgtw
