@@ -34,6 +34,12 @@ double RandomStream::Uniform() { return static_cast<double>(Bits() >> 11) * 0x1.
 
 double RandomStream::Uniform(double min, double max) { return min + (max - min) * Uniform(); }
 
+size_t RandomStream::Index(size_t n) {
+  return static_cast<size_t>(Uniform() * static_cast<double>(n));
+}
+
+bool RandomStream::Chance(double probability) { return Uniform() < probability; }
+
 double RandomStream::Normal() {
   const double radius = std::sqrt(-2.0 * std::log(1.0 - Uniform()));
   return radius * std::cos(2.0 * std::numbers::pi * Uniform());

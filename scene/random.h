@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 
@@ -24,6 +25,8 @@ class RandomStream {
   uint64_t Bits();
   double Uniform();                        // [0, 1)
   double Uniform(double min, double max);  // [min, max)
+  size_t Index(size_t n);                  // [0, n), n >= 1
+  bool Chance(double probability);         // true with this probability
   double Normal();                         // mean 0, sigma 1 (Box-Muller)
   Eigen::Vector3d NormalVector();          // three independent Normal()
   Eigen::Quaterniond Rotation();           // uniform on SO(3)

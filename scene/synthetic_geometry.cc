@@ -33,16 +33,39 @@ std::optional<double> IntersectSlabs(const Eigen::Vector3d& origin,
 
 std::optional<double> IntersectEllipsoid(const Eigen::Vector3d& origin,
                                          const Eigen::Vector3d& direction,
-                                         const Eigen::Vector3d& half_size) {
+                                         const Eigen::Vector3d& half_size,
+                                         bool from_inside) {
   const Eigen::Vector3d o = origin.cwiseQuotient(half_size);
   const Eigen::Vector3d d = direction.cwiseQuotient(half_size);
   const double a = d.squaredNorm();
   const double b = o.dot(d);
   const double discriminant = b * b - a * (o.squaredNorm() - 1.0);
   if (discriminant < 0.0) return std::nullopt;
-  const double depth = (-b - std::sqrt(discriminant)) / a;
+  const double root = std::sqrt(discriminant);
+  const double depth = (from_inside ? -b + root : -b - root) / a;
   if (depth < kMinDepth) return std::nullopt;
   return depth;
+}
+
+std::optional<double> IntersectCylinder(const Eigen::Vector3d& origin,
+                                        const Eigen::Vector3d& direction,
+                                        const Eigen::Vector3d& half_size) {
+  const Eigen::Vector3d o = origin.cwiseQuotient(half_size);
+  const Eigen::Vector3d d = direction.cwiseQuotient(half_size);
+  const double to_cap1 = (-1.0 - o.z()) / d.z();
+  const double to_cap2 = (1.0 - o.z()) / d.z();
+  const double a = d.head<2>().squaredNorm();
+  const double b = o.head<2>().dot(d.head<2>());
+  const double c = o.head<2>().squaredNorm() - 1.0;
+  const double discriminant = b * b - a * c;
+  const bool is_beside_axis = a == 0.0 && c > 0.0;
+  if (discriminant < 0.0 || is_beside_axis) return std::nullopt;
+  const double root = std::sqrt(discriminant);
+  // Along the axis, inside, the mantle's depths are NaN, which max and min pass over.
+  const double entry = std::max(std::min(to_cap1, to_cap2), (-b - root) / a);
+  const double exit = std::min(std::max(to_cap1, to_cap2), (-b + root) / a);
+  if (!(entry <= exit) || entry < kMinDepth) return std::nullopt;
+  return entry;
 }
 
 template <typename Shapes, typename Deref>
@@ -65,35 +88,47 @@ Shape MakeShape(ShapeKind kind,
                 double yaw_rad,
                 const Texture& texture) {
   const Eigen::AngleAxisd world_from_local(yaw_rad, Eigen::Vector3d::UnitZ());
-  return {
-      kind, world_from_local.toRotationMatrix().transpose(), centre_in_world, half_size, texture};
+  return {{kind, world_from_local.toRotationMatrix().transpose(), centre_in_world, half_size},
+          texture};
 }
 
-std::optional<double> Intersect(const Shape& shape, const Ray& ray) {
+std::optional<double> Intersect(const Solid& solid, const Ray& ray) {
   const Eigen::Vector3d origin =
-      shape.local_from_world_rotation * (ray.origin - shape.centre_in_world);
-  const Eigen::Vector3d direction = shape.local_from_world_rotation * ray.direction;
-  if (shape.kind == ShapeKind::kEllipsoid) {
-    return IntersectEllipsoid(origin, direction, shape.half_size);
+      solid.local_from_world_rotation * (ray.origin - solid.centre_in_world);
+  const Eigen::Vector3d direction = solid.local_from_world_rotation * ray.direction;
+  switch (solid.kind) {
+    case ShapeKind::kEllipsoid:
+    case ShapeKind::kDome:
+      return IntersectEllipsoid(origin, direction, solid.half_size, solid.kind == ShapeKind::kDome);
+    case ShapeKind::kCylinder:
+      return IntersectCylinder(origin, direction, solid.half_size);
+    case ShapeKind::kBox:
+    case ShapeKind::kRoom:
+      break;
   }
-  return IntersectSlabs(origin, direction, shape.half_size, shape.kind == ShapeKind::kRoom);
+  return IntersectSlabs(origin, direction, solid.half_size, solid.kind == ShapeKind::kRoom);
 }
 
-SurfacePoint DescribeSurface(const Shape& shape, const Eigen::Vector3d& point_in_world) {
+SurfacePoint DescribeSurface(const Solid& solid, const Eigen::Vector3d& point_in_world) {
   const Eigen::Vector3d local =
-      shape.local_from_world_rotation * (point_in_world - shape.centre_in_world);
-  const Eigen::Vector3d relative = local.cwiseQuotient(shape.half_size);
+      solid.local_from_world_rotation * (point_in_world - solid.centre_in_world);
+  const Eigen::Vector3d relative = local.cwiseQuotient(solid.half_size);
   int axis = 0;
   relative.cwiseAbs().maxCoeff(&axis);
   const bool is_positive = relative[axis] > 0.0;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-  if (shape.kind == ShapeKind::kEllipsoid) {
-    normal = relative.cwiseQuotient(shape.half_size).normalized();
+  const bool is_ball = solid.kind == ShapeKind::kEllipsoid || solid.kind == ShapeKind::kDome;
+  const bool is_mantle =
+      solid.kind == ShapeKind::kCylinder && std::abs(relative.z()) < relative.head<2>().norm();
+  if (is_ball || is_mantle) {
+    normal = relative.cwiseQuotient(solid.half_size);
+    if (is_mantle) normal.z() = 0.0;
+    normal.normalize();
   } else {
-    const double outwards = is_positive ? 1.0 : -1.0;
-    normal[axis] = shape.kind == ShapeKind::kRoom ? -outwards : outwards;
+    normal[axis] = is_positive ? 1.0 : -1.0;
   }
-  return {shape.local_from_world_rotation.transpose() * normal,
+  if (solid.kind == ShapeKind::kRoom || solid.kind == ShapeKind::kDome) normal = -normal;
+  return {solid.local_from_world_rotation.transpose() * normal,
           2 * axis + (is_positive ? 1 : 0),
           {local[(axis + 1) % 3], local[(axis + 2) % 3]}};
 }

@@ -22,14 +22,19 @@ struct Ray {
 enum class ShapeKind {
   kBox,        // |x_i| <= half_size_i in its own frame
   kEllipsoid,  // sum (x_i / half_size_i)^2 <= 1
-  kRoom        // a box seen from inside
+  kCylinder,   // (x / half_size_0)^2 + (y / half_size_1)^2 <= 1 and |z| <= half_size_2
+  kRoom,       // a box seen from inside
+  kDome        // an ellipsoid seen from inside
 };
 
-struct Shape {
+struct Solid {
   ShapeKind kind = ShapeKind::kBox;
   Eigen::Matrix3d local_from_world_rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d centre_in_world = Eigen::Vector3d::Zero();
   Eigen::Vector3d half_size = Eigen::Vector3d::Ones();
+};
+
+struct Shape : Solid {
   Texture texture;
 };
 
@@ -40,15 +45,16 @@ Shape MakeShape(ShapeKind kind,
                 double yaw_rad,
                 const Texture& texture);
 
-// The smallest positive depth at which the ray meets the shape's surface from its visible side.
-std::optional<double> Intersect(const Shape& shape, const Ray& ray);
+// The smallest positive depth at which the ray meets the solid's surface from its visible side;
+// nothing from the other side.
+std::optional<double> Intersect(const Solid& solid, const Ray& ray);
 
 struct SurfacePoint {
   Eigen::Vector3d normal_in_world = Eigen::Vector3d::UnitZ();  // unit, towards the visible side
   int face = 0;                                                // 0..5, of the enclosing box
   Eigen::Vector2d uv = Eigen::Vector2d::Zero();                // on the face, scene units
 };
-SurfacePoint DescribeSurface(const Shape& shape, const Eigen::Vector3d& point_in_world);
+SurfacePoint DescribeSurface(const Solid& solid, const Eigen::Vector3d& point_in_world);
 
 struct Hit {
   double depth = 0.0;

@@ -9,7 +9,6 @@
 #include <numbers>
 
 namespace vgtw {
-namespace {
 
 // Cheaper than HashKey: called about ten times per sample of a picture.
 uint32_t LatticeHash(uint32_t x, uint32_t y, uint32_t seed) {
@@ -18,6 +17,8 @@ uint32_t LatticeHash(uint32_t x, uint32_t y, uint32_t seed) {
   hash = (hash ^ (hash >> 15)) * 0x846ca68bu;
   return hash ^ (hash >> 16);
 }
+
+namespace {
 
 float ToUnit(uint32_t bits) { return static_cast<float>(bits & 0xffffu) / 65535.0f; }
 
@@ -64,20 +65,6 @@ float ValueNoise(const Eigen::Vector2d& uv, double cell_size, uint32_t seed) {
 // 1 while a detail of size `detail` is at least two footprints large, 0 below one.
 float Visibility(double detail, double footprint) {
   return static_cast<float>(std::clamp(detail / footprint - 1.0, 0.0, 1.0));
-}
-
-float FractalNoise(const Eigen::Vector2d& uv, double footprint, uint32_t seed) {
-  constexpr std::array<float, 6> kAmplitudes = {0.34f, 0.28f, 0.24f, 0.20f, 0.16f, 0.12f};
-  constexpr double kLargestCell = 0.8;
-  float sum = 0.0f;
-  double cell_size = kLargestCell;
-  for (size_t octave = 0; octave < kAmplitudes.size(); ++octave, cell_size *= 0.5) {
-    const float visibility = Visibility(cell_size, footprint);
-    if (visibility == 0.0f) break;
-    const uint32_t octave_seed = seed + static_cast<uint32_t>(octave) * 0x9e3779b9u;
-    sum += kAmplitudes[octave] * visibility * ValueNoise(uv, cell_size, octave_seed);
-  }
-  return sum;
 }
 
 // Signed distances to the edge, positive inside, for a figure of half extent `half` around 0.
@@ -162,6 +149,20 @@ Eigen::Vector3f ColourOfHue(double hue, double saturation, double value) {
 }
 
 }  // namespace
+
+float FractalNoise(const Eigen::Vector2d& uv, double footprint, uint32_t seed) {
+  constexpr std::array<float, 6> kAmplitudes = {0.34f, 0.28f, 0.24f, 0.20f, 0.16f, 0.12f};
+  constexpr double kLargestCell = 0.8;
+  float sum = 0.0f;
+  double cell_size = kLargestCell;
+  for (size_t octave = 0; octave < kAmplitudes.size(); ++octave, cell_size *= 0.5) {
+    const float visibility = Visibility(cell_size, footprint);
+    if (visibility == 0.0f) break;
+    const uint32_t octave_seed = seed + static_cast<uint32_t>(octave) * 0x9e3779b9u;
+    sum += kAmplitudes[octave] * visibility * ValueNoise(uv, cell_size, octave_seed);
+  }
+  return sum;
+}
 
 Texture MakeTexture(uint64_t seed, const TextureStyle& style) {
   RandomStream random(HashKey({seed}));

@@ -30,6 +30,13 @@ struct TextureStyle {
 };
 Texture MakeTexture(uint64_t seed, const TextureStyle& style = {});
 
+// Smooth noise, zero on the average and rarely beyond [-1,1]: octaves with cells of 0.8 (scene
+// units) and smaller, those below `footprint` left out.
+float FractalNoise(const Eigen::Vector2d& uv, double footprint, uint32_t seed);
+
+// Well mixed bits of a place on an integer lattice.
+uint32_t LatticeHash(uint32_t x, uint32_t y, uint32_t seed);
+
 // RGB in [0,1] at `uv` (scene units) of one face of a body, averaged over about a square of side
 // `footprint` (scene units, > 0): finer detail fades out instead of aliasing.
 Eigen::Vector3f Albedo(const Texture& texture,
