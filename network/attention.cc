@@ -24,9 +24,11 @@ at::Tensor LogitBias(const at::Tensor& excluded_keys, at::ScalarType type) {
 }
 
 #ifndef VGTW_HAS_FUSED_ATTENTION
+constexpr int64_t kMaxLogitsOnCpu = int64_t{1} << 20;
+
 // One head at a time on a CPU, whose caches then hold the logits; all heads on a GPU.
 int64_t NumRows(const at::Tensor& q) {
-  const int64_t max_logits = q.is_cpu() ? int64_t{1} << 20 : int64_t{1} << 28;
+  const int64_t max_logits = q.is_cpu() ? kMaxLogitsOnCpu : int64_t{1} << 28;
   const int64_t num_heads = q.size(0);
   return std::max<int64_t>(1, max_logits / (num_heads * q.size(1)));
 }
@@ -59,6 +61,10 @@ at::Tensor Attend(const at::Tensor& q,
   if (bias.defined()) return at::scaled_dot_product_attention(q, k, v, bias);
   return at::scaled_dot_product_attention(q, k, v);
 #else
+  // Small ones of all views and heads at once, as in training.
+  if (q.size(0) * q.size(1) * q.size(2) * k.size(2) <= kMaxLogitsOnCpu && !bias.defined()) {
+    return AttendInRows(q.flatten(0, 1), k.flatten(0, 1), v.flatten(0, 1), {}).view(q.sizes());
+  }
   const int64_t num_at_once = q.is_cpu() ? 1 : q.size(1);
   std::vector<at::Tensor> batches;
   for (int64_t b = 0; b < q.size(0); ++b) {

@@ -7,7 +7,6 @@ namespace vgtw {
 namespace {
 
 constexpr int64_t kEncodingSize = 9;
-constexpr int64_t kTrunkDepth = 4;
 constexpr int kNumSteps = 4;
 constexpr double kNormEps = 1e-5;
 constexpr double kAdaptiveNormEps = 1e-6;
@@ -34,7 +33,8 @@ CameraHead::CameraHead(const ParameterScope& scope, const VggtConfig& config)
   BlockConfig block;
   block.attention = {.dim = 2 * config.dim, .num_heads = config.num_camera_heads};
   block.norm_eps = kNormEps;
-  for (int64_t i = 0; i < kTrunkDepth; ++i) trunk_.emplace_back(scope["trunk"][i], block);
+  for (int64_t i = 0; i < config.num_camera_blocks; ++i)
+    trunk_.emplace_back(scope["trunk"][i], block);
 }
 
 std::vector<at::Tensor> CameraHead::operator()(const at::Tensor& tokens) const {

@@ -38,8 +38,10 @@ struct VggtConfig {
   int64_t depth = 24;  // pairs of a frame block and a global block
   int64_t num_heads = 16;
   int64_t num_camera_heads = 16;  // attention heads of the camera head
+  int64_t num_camera_blocks = 4;  // its depth
   std::array<int64_t, 4> head_layers = {4, 11, 17, 23};
   DptConfig dpt = {};
+  bool has_point_head = true;  // nothing else needs its points: small networks do without
   // Both for VGTW; the distractor head has the official prefix "mask_head".
   std::optional<LoraConfig> lora = {};
   bool has_distractor_head = false;

@@ -23,6 +23,7 @@ constexpr std::array<std::pair<NetworkKind, std::string_view>, 4> kNames = {{
 // What a damaged file may announce must neither overflow nor keep the loader busy.
 constexpr uint64_t kMaxSize = uint64_t{1} << 20;
 constexpr int64_t kMaxDepth = 1024;
+constexpr int kMaxSide = 1 << 14;
 
 constexpr int64_t kPublishedHeadDim = 64;
 // Share of the trunk's layers at whose end a dense head reads, of the published depth.
@@ -110,6 +111,16 @@ class Sizes {
     FailKey(kLoraAlphaKey, "a number");
   }
 
+  int SideOfImages(int published) const {
+    const std::string* text = Metadata(kSideKey);
+    const auto side_px = text == nullptr ? published : Parse<int>(*text);
+    if (side_px && *side_px > 0 && *side_px <= kMaxSide && *side_px % kPatchSize == 0) {
+      return *side_px;
+    }
+    FailKey(kSideKey,
+            "a multiple of " + std::to_string(kPatchSize) + " up to " + std::to_string(kMaxSide));
+  }
+
   std::array<int64_t, 4> HeadLayers(const std::array<int64_t, 4>& ends, int64_t depth) const {
     if (const std::string* text = Metadata(kHeadLayersKey)) {
       if (const auto layers = ParseLayers(*text, depth)) return *layers;
@@ -183,8 +194,10 @@ VggtConfig ReadVggt(const Sizes& sizes) {
       sizes.Axis(first_block + "attn.q_norm.weight", 1, 0, kPublishedHeadDim));
   config.num_camera_heads =
       sizes.NumHeadsByKey(kCameraHeadsKey, 2 * config.dim, config.num_camera_heads);
+  config.num_camera_blocks = sizes.Depth({"camera_head.trunk."}, config.num_camera_blocks);
   config.head_layers = sizes.HeadLayers(kVggtLayerEnds, config.depth);
   config.dpt = sizes.Dpt("depth_head.");
+  config.has_point_head = sizes.HasBelow("point_head.");
   // The encoder has its own convolution one level deeper.
   config.encoder = sizes.Encoder("aggregator.patch_embed.", config.dim, config.num_heads);
   if (sizes.HasBelow("aggregator.patch_embed.proj.")) config.encoder.reset();
@@ -262,7 +275,10 @@ NetworkDescription IdentifyNetwork(const TensorShapes& shapes,
   if (sizes.HasAny(is_of_vggt)) {
     VggtConfig config = ReadVggt(sizes);
     const bool is_vgtw = config.lora || config.has_distractor_head;
-    return {is_vgtw ? NetworkKind::kVgtw : NetworkKind::kVggt, std::move(config)};
+    NetworkDescription network{is_vgtw ? NetworkKind::kVgtw : NetworkKind::kVggt,
+                               std::move(config)};
+    network.side_px = sizes.SideOfImages(network.side_px);
+    return network;
   }
   if (sizes.HasBelow("encoder.") || sizes.HasBelow("point_decoder.")) {
     Pi3Config config = ReadPi3(sizes);

@@ -23,6 +23,7 @@ std::optional<NetworkKind> FindNetworkKind(std::string_view name);
 struct NetworkDescription {
   NetworkKind kind = NetworkKind::kVggt;
   std::variant<VggtConfig, Pi3Config> config;
+  int side_px = 518;  // of the images that it was trained on, for a VGGT
 };
 
 // By the name that they have in the official state dicts.
@@ -37,6 +38,7 @@ inline constexpr char kCameraHeadsKey[] = "vgtw.camera_heads";    // VGGT, VGTW
 inline constexpr char kDecoderHeadsKey[] = "vgtw.decoder_heads";  // pi3: of its three decoders
 inline constexpr char kLoraAlphaKey[] = "vgtw.lora_alpha";
 inline constexpr char kHeadLayersKey[] = "vgtw.head_layers";  // "4,11,17,23"
+inline constexpr char kSideKey[] = "vgtw.side_px";
 
 // Which network these tensors are of, told by their names, and its sizes, told by their shapes.
 // Where neither shapes nor `metadata` tell a size, it is as in the published networks: 16 heads of

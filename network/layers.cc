@@ -2,6 +2,7 @@
 #include "network/layers.h"
 
 #include "network/attention.h"
+#include "network/training_mode.h"
 #include "scene/error.h"
 
 #include <cmath>
@@ -94,7 +95,7 @@ at::Tensor Attention::ToHeads(const at::Tensor& x) const {
 }
 
 at::Tensor Attention::Update(const Lora& lora, const at::Tensor& x) const {
-  const at::Tensor reduced = at::linear(x.to(lora.down.scalar_type()), lora.down);
+  const at::Tensor reduced = at::linear(DropLoraInputs(x).to(lora.down.scalar_type()), lora.down);
   return ToHeads(at::linear(reduced, lora.up)) * lora_scale_;
 }
 
@@ -150,6 +151,15 @@ TransformerBlock::TransformerBlock(const ParameterScope& scope, const BlockConfi
 at::Tensor TransformerBlock::operator()(const at::Tensor& x,
                                         const RotaryTable* rotary,
                                         const at::Tensor& excluded_keys) const {
+  const auto run =
+      [this, excluded_keys, table = rotary != nullptr ? std::optional(*rotary) : std::nullopt](
+          const at::Tensor& input) { return Run(input, table ? &*table : nullptr, excluded_keys); };
+  return RunBlock(run, x);
+}
+
+at::Tensor TransformerBlock::Run(const at::Tensor& x,
+                                 const RotaryTable* rotary,
+                                 const at::Tensor& excluded_keys) const {
   const at::Tensor attended = AddScaled(x, attention_(norm1_(x), rotary, excluded_keys), scale1_);
   return AddScaled(attended, fc2_(at::gelu(fc1_(norm2_(attended)))), scale2_);
 }

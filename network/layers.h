@@ -149,6 +149,10 @@ class TransformerBlock {
   int64_t head_dim() const { return attention_.head_dim(); }
 
  private:
+  at::Tensor Run(const at::Tensor& x,
+                 const RotaryTable* rotary,
+                 const at::Tensor& excluded_keys) const;
+
   LayerNorm norm1_;
   Attention attention_;
   LayerNorm norm2_;

@@ -45,7 +45,7 @@ struct CameraOutputs {
 struct DenseOutputs {
   at::Tensor depth = {};              // [n, H, W]
   at::Tensor depth_conf = {};         // [n, H, W], > 1 for VGGT; pi3: logit
-  at::Tensor points = {};             // VGGT: [n, H, W, 3] in the world
+  at::Tensor points = {};             // VGGT with a point head: [n, H, W, 3] in the world
   at::Tensor points_conf = {};        // VGGT: [n, H, W]
   at::Tensor local_points = {};       // pi3: [n, H, W, 3] in the frame of the camera
   at::Tensor distractor_logits = {};  // [n, H, W]

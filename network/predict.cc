@@ -64,7 +64,7 @@ auto WithPlainErrors(const Work& work) {
 }  // namespace
 
 void PredictOptions::Check() const {
-  VGTW_CHECK(side_px >= kPatchSize && side_px <= 1 << 14 && side_px % kPatchSize == 0,
+  VGTW_CHECK(side_px >= 0 && side_px <= 1 << 14 && side_px % kPatchSize == 0,
              "side_px = " + std::to_string(side_px) + ", must be a multiple of 14");
   VGTW_CHECK(max_pixels >= kPatchSize * kPatchSize && max_pixels <= 1 << 28,
              "max_pixels = " + std::to_string(max_pixels));

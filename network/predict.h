@@ -33,7 +33,8 @@ struct PredictOptions {
   std::optional<NetworkKind> kind = {};  // must be that of the weights; none = whatever they are of
   std::string device = "cpu";            // or "cuda", "cuda:1"
   Precision precision = Precision::kFloat32;
-  int side_px = 518;          // width of the network's image (VGGT, VGTW), multiple of 14
+  // Width of the network's image (VGGT, VGTW), multiple of 14; 0 = that of its training.
+  int side_px = 0;
   int max_pixels = 255000;    // of the network's image (pi3)
   int max_views_at_once = 0;  // 0 = as many as max_memory_gib allows
   // Views that two chunks share; fewer where chunks are so small that less than half were new.

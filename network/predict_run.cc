@@ -270,7 +270,7 @@ PreprocessOptions LoaderOf(const NetworkDescription& description, const PredictO
   PreprocessOptions loader;
   const bool is_vggt = std::holds_alternative<VggtConfig>(description.config);
   loader.policy = is_vggt ? ResizePolicy::kCrop : ResizePolicy::kStretch;
-  loader.side_px = options.side_px;
+  loader.side_px = options.side_px > 0 ? options.side_px : description.side_px;
   loader.max_pixels = options.max_pixels;
   return loader;
 }

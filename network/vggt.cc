@@ -39,8 +39,10 @@ Vggt::Vggt(const ParameterScope& scope, const VggtConfig& config)
     : config_(config),
       aggregator_(scope["aggregator"], config),
       camera_head_(HeadScope(scope, config)["camera_head"], config),
-      depth_head_(HeadScope(scope, config)["depth_head"], HeadOf(config, 2)),
-      point_head_(HeadScope(scope, config)["point_head"], HeadOf(config, 4)) {
+      depth_head_(HeadScope(scope, config)["depth_head"], HeadOf(config, 2)) {
+  if (config.has_point_head) {
+    point_head_.emplace(HeadScope(scope, config)["point_head"], HeadOf(config, 4));
+  }
   if (!config.has_distractor_head) return;
   distractor_head_.emplace(MakeDistractorHead(scope["mask_head"], config));
 }
@@ -78,8 +80,8 @@ DenseOutputs Vggt::PredictMaps(const Features& features,
   const at::Tensor depth = run(depth_head_);
   outputs.depth = depth.select(1, 0).exp();
   outputs.depth_conf = 1.0 + depth.select(1, 1).exp();
-  if (choice.points) {
-    const at::Tensor points = run(point_head_);
+  if (choice.points && point_head_) {
+    const at::Tensor points = run(*point_head_);
     outputs.points = InverseLog(points.slice(1, 0, 3)).permute({0, 2, 3, 1});
     outputs.points_conf = 1.0 + points.select(1, 3).exp();
   }

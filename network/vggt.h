@@ -37,7 +37,7 @@ class Vggt : public Model {
   Aggregator aggregator_;
   CameraHead camera_head_;
   DptHead depth_head_;
-  DptHead point_head_;
+  std::optional<DptHead> point_head_;
   std::optional<DptHead> distractor_head_;
 };
 

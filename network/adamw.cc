@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "network/adamw.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <ATen/ATen.h>
+
+namespace vgtw {
+namespace {
+
+constexpr double kLowestRate = 1e-8;
+
+}  // namespace
+
+double LearningRateSchedule::At(int64_t step) const {
+  const double num_warmup = warmup_share * static_cast<double>(num_steps);
+  const auto done = static_cast<double>(step);
+  if (done < num_warmup) return kLowestRate + (peak - kLowestRate) * done / num_warmup;
+  const double share = (done - num_warmup) / (static_cast<double>(num_steps) - num_warmup);
+  return kLowestRate + 0.5 * (peak - kLowestRate) * (1.0 + std::cos(std::numbers::pi * share));
+}
+
+AdamW::AdamW(TrainedParameters& parameters, const AdamWOptions& options)
+    : parameters_(parameters), options_(options) {
+  for (const TrainedParameter& parameter : parameters.all()) {
+    const auto zero = [&] {
+      return parameter.is_trained ? at::zeros_like(parameter.value) : at::Tensor();
+    };
+    moments_.first.push_back(zero());
+    moments_.second.push_back(zero());
+    if (options.ema_decay > 0.0) {
+      moments_.mean.push_back(parameter.is_trained ? parameter.value.clone() : at::Tensor());
+    }
+  }
+}
+
+AdamW::GroupNorms AdamW::Clip(std::vector<at::Tensor>& gradients) const {
+  GroupNorms norms = {};
+  for (size_t i = 0; i < gradients.size(); ++i) {
+    if (!gradients[i].defined()) continue;
+    const auto group = static_cast<size_t>(parameters_.all()[i].group);
+    norms[group] += gradients[i].square().sum().item<double>();
+  }
+  for (double& norm : norms) norm = std::sqrt(norm);
+  if (options_.max_group_norm <= 0.0) return norms;
+  for (size_t i = 0; i < gradients.size(); ++i) {
+    const double norm = norms[static_cast<size_t>(parameters_.all()[i].group)];
+    if (!gradients[i].defined() || norm <= options_.max_group_norm) continue;
+    gradients[i] = gradients[i] * (options_.max_group_norm / norm);
+  }
+  return norms;
+}
+
+AdamW::GroupNorms AdamW::Step(std::vector<at::Tensor> gradients,
+                              int64_t step,
+                              double learning_rate) {
+  const GroupNorms norms = Clip(gradients);
+  const auto power = static_cast<double>(step + 1);
+  const double correction1 = 1.0 - std::pow(options_.beta1, power);
+  const double correction2 = 1.0 - std::pow(options_.beta2, power);
+  for (size_t i = 0; i < gradients.size(); ++i) {
+    TrainedParameter& parameter = parameters_.all()[i];
+    if (!parameter.is_trained || !gradients[i].defined()) continue;
+    if (parameter.decays) parameter.value.mul_(1.0 - learning_rate * options_.weight_decay);
+    at::Tensor& first = moments_.first[i];
+    at::Tensor& second = moments_.second[i];
+    first.mul_(options_.beta1).add_(gradients[i], 1.0 - options_.beta1);
+    second.mul_(options_.beta2).addcmul_(gradients[i], gradients[i], 1.0 - options_.beta2);
+    const at::Tensor root = (second / correction2).sqrt_().add_(options_.epsilon);
+    parameter.value.addcdiv_(first, root, -learning_rate / correction1);
+    if (moments_.mean.empty()) continue;
+    moments_.mean[i].lerp_(parameter.value, 1.0 - options_.ema_decay);
+  }
+  return norms;
+}
+
+}  // namespace vgtw
