@@ -33,13 +33,14 @@ struct NormalisedTruth {
 
 // The frame and unit in which networks predict: the world is the frame of the first camera, the
 // mean distance of points with known depth from its centre is 1. Unknown depths become 0. Law: the
-// same for all worlds that differ by a similarity. nullopt if no depth of these views is known.
+// same for all worlds that differ by a similarity. nullopt if that mean is no positive number, as
+// where no depth of these views is known.
 std::optional<NormalisedTruth> NormaliseTruth(const GeometryTruth& truth,
                                               ScaleViews scale_views = ScaleViews::kAll);
 
 struct CameraLossOptions {
-  // Error from which on the loss is linear; 0 = everywhere (L1). Parts of an encoding that are more
-  // than this far off count |error| - scale / 2, others error^2 / (2 scale).
+  // Error from which on the loss is linear; 0 = everywhere (L1). An element of an encoding that is
+  // further off counts |error| - scale / 2, others error^2 / (2 scale).
   double huber_scale = 0.0;
   double translation_weight = 1.0;
   double rotation_weight = 1.0;
