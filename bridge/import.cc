@@ -21,7 +21,12 @@ constexpr std::array kImporters = {&kColmapImporter,
                                    &kLlffImporter,
                                    &kTumImporter,
                                    &kMonst3rImporter,
-                                   &kVggtLongImporter};
+                                   &kVggtLongImporter,
+                                   &kCut3rImporter,
+                                   &kDust3rImporter,
+                                   &kFast3rImporter,
+                                   &kPi3Importer,
+                                   &kMapAnythingImporter};
 
 struct Located {
   const Importer* importer = nullptr;
@@ -35,6 +40,28 @@ std::string FormatList() {
             std::string(importer->description);
   }
   return list;
+}
+
+// Files that people try, but that lack what is needed.
+[[noreturn]] void FailUnknown(const fs::path& input_path) {
+  const fs::path extension = input_path.extension();
+  for (const char* mesh : {".ply", ".glb", ".obj", ".pcd"}) {
+    if (extension != mesh) continue;
+    Fail(
+        input_path,
+        "is a point cloud or mesh (" + std::string(mesh) + "), which tells no camera of a photo",
+        FormatList(),
+        "for pi3 save its output as demo_gradio.py does: numpy.savez(\"predictions.npz\", points=, "
+        "conf=, camera_poses=)");
+  }
+  for (const char* pickled : {".pt", ".pth", ".pkl", ".pickle"}) {
+    if (extension != pickled) continue;
+    Fail(input_path,
+         "is a pickle (" + std::string(pickled) + "), which can hold any program",
+         FormatList(),
+         "load it where you trust it and save its arrays by numpy.savez under the same names");
+  }
+  Fail(input_path, "is of no known format", FormatList());
 }
 
 Located LocateAs(ImportFormat format, const fs::path& input_path, const PhotoIndex& photos) {
@@ -54,7 +81,7 @@ Located Recognise(const fs::path& input_path, const PhotoIndex& photos) {
   for (const Importer* importer : kImporters) {
     const auto path = importer->locate(input_path, photos);
     if (!path) continue;
-    if (found.importer != nullptr) {
+    if (found.importer != nullptr && importer->special_case_of != found.importer) {
       Fail(
           input_path,
           "holds both " + std::string(found.importer->name) + " and " + std::string(importer->name),
@@ -63,9 +90,7 @@ Located Recognise(const fs::path& input_path, const PhotoIndex& photos) {
     }
     found = {importer, *path};
   }
-  if (found.importer == nullptr) {
-    Fail(input_path, "is of no known format", FormatList());
-  }
+  if (found.importer == nullptr) FailUnknown(input_path);
   return found;
 }
 

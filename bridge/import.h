@@ -20,8 +20,13 @@ enum class ImportFormat {
   kTum,        // trajectory "timestamp tx ty tz qx qy qz qw" (camera-to-world) + intrinsics
   kLlff,       // poses_bounds.npy
   kDa3Npz,     // results.npz of Depth Anything 3
-  kMonst3r,    // folder of MonST3R or Easi3R: pred_traj.txt, pred_intrinsics.txt, frame_*.npy
-  kVggtLong    // camera_poses.txt (and intrinsic.txt) of VGGT-Long
+  kMonst3r,    // folder of MonST3R, Easi3R or CUT3R's evaluation: pred_traj.txt, frame_*.npy
+  kVggtLong,   // camera_poses.txt (and intrinsic.txt) of VGGT-Long
+  kCut3r,      // folder of CUT3R's demo: camera/%06d.npz, depth, conf
+  kDust3r,     // scene of DUSt3R or MASt3R as .npz or folder of .npy: poses, focals, depthmaps, ...
+  kFast3r,     // pointmaps_and_camera_params.npz of Fast3R
+  kPi3,        // predictions.npz of pi3's demo: points, conf, camera_poses
+  kMapAnything  // predictions.npz of MapAnything's demo
 };
 
 // How per-pixel maps relate to the original photos. kAuto is resolved from the sizes.

@@ -4,6 +4,7 @@
 #include "scene/error.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -19,15 +20,6 @@ constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
 [[noreturn]] void FailShape(const NpyReader& reader, const std::string& expected) {
   Fail(reader.origin(), "has shape " + ShapeText(reader.shape()), expected);
-}
-
-// The first of these keys that the store has.
-std::optional<std::string> FindKey(const ArrayStore& store,
-                                   std::initializer_list<const char*> keys) {
-  for (const char* key : keys) {
-    if (store.Contains(key)) return key;
-  }
-  return std::nullopt;
 }
 
 // [S, ...] with `num_dimensions` dimensions in all: drops a leading batch of 1, adds S = 1.
@@ -52,6 +44,13 @@ bool IsUsableSize(uint64_t height, uint64_t width) {
 }
 
 }  // namespace
+
+std::optional<std::string> FindKey(const ArrayStore& store, const ArrayKeys::Words& words) {
+  for (const std::string& word : words) {
+    if (store.Contains(word)) return word;
+  }
+  return std::nullopt;
+}
 
 MapSize SingleMapSize(const NpyReader& reader) {
   std::vector<uint64_t> shape = reader.shape();
@@ -84,6 +83,19 @@ std::optional<ArrayViews::Stack> ArrayViews::OpenMatrices(const ArrayStore& stor
   }
   stack.num_views = shape[0];
   stack.view_shape = {shape[1], shape[2]};
+  Agree(stack);
+  return stack;
+}
+
+std::optional<ArrayViews::Stack> ArrayViews::OpenVectors(const ArrayStore& store,
+                                                         const std::string& key) {
+  Stack stack{store.Open(key), 0, {1}};
+  const std::vector<uint64_t>& shape = stack.reader.shape();
+  if (shape.size() == 2) stack.view_shape = {shape[1]};
+  const bool fits = (shape.size() == 1 || shape.size() == 2) && shape[0] >= 1 &&
+                    shape[0] <= kMaxViews && (stack.view_shape[0] == 1 || stack.view_shape[0] == 2);
+  if (!fits) FailShape(stack.reader, "(S,), (S, 1) or (S, 2)");
+  stack.num_views = shape[0];
   Agree(stack);
   return stack;
 }
@@ -126,17 +138,17 @@ void ArrayViews::Agree(const Stack& stack) {
   }
 }
 
-ArrayViews::ArrayViews(const ArrayStore& store) {
-  extrinsic_ =
-      OpenMatrices(store, FindKey(store, {"extrinsic", "extrinsics"}).value_or("extrinsic"), 4);
-  if (const auto key = FindKey(store, {"intrinsic", "intrinsics"})) {
-    intrinsic_ = OpenMatrices(store, *key, 3);
-  }
-  if (store.Contains("depth")) depth_ = OpenMaps(store, "depth", 1);
-  if (const auto key = FindKey(store, {"depth_conf", "conf"}))
-    depth_conf_ = OpenMaps(store, *key, 1);
-  if (store.Contains("world_points")) points_ = OpenMaps(store, "world_points", 3);
-  if (const auto key = FindKey(store, {"depth_mask", "depth_mask_binary"})) {
+ArrayViews::ArrayViews(const ArrayStore& store, const ArrayKeys& keys) {
+  const auto find = [&](const ArrayKeys::Words& words) { return FindKey(store, words); };
+  extrinsic_ = OpenMatrices(store, find(keys.extrinsic).value_or(keys.extrinsic.front()), 4);
+  if (const auto key = find(keys.intrinsic)) intrinsic_ = OpenMatrices(store, *key, 3);
+  if (const auto key = find(keys.focal)) focal_ = OpenVectors(store, *key);
+  if (const auto key = find(keys.principal_point)) principal_point_ = OpenVectors(store, *key);
+  if (const auto key = find(keys.depth)) depth_ = OpenMaps(store, *key, 1);
+  if (const auto key = find(keys.depth_conf)) depth_conf_ = OpenMaps(store, *key, 1);
+  if (const auto key = find(keys.points)) points_ = OpenMaps(store, *key, 3);
+  if (const auto key = find(keys.valid)) valid_ = OpenMaps(store, *key, 1);
+  if (const auto key = find(keys.distractor)) {
     distractor_ = OpenMaps(store, *key, 1);
     is_logit_ = *key == "depth_mask" && distractor_->reader.IsFloatingPoint();
   }
@@ -152,22 +164,45 @@ ViewArrays ArrayViews::Next() {
     intrinsic_->reader.Read(std::span<double>(values).first(9));
     view.intrinsic = Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(values.data());
   }
+  view.focal = NextVector(focal_);
+  view.principal_point = NextVector(principal_point_);
   if (depth_) {
     view.depth = NextMap(depth_->reader, *map_size_);
     ForgetNonPositive(view.depth);
   }
   if (depth_conf_) view.depth_conf = NextMap(depth_conf_->reader, *map_size_);
   if (distractor_) view.distractor = NextDistractor();
-  if (points_) {
-    static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float));
-    view.points = Grid<Eigen::Vector3f>(map_size_->width, map_size_->height);
-    points_->reader.Read(
-        std::span<float>(view.points.data().front().data(), 3 * view.points.size()));
-    for (Eigen::Vector3f& point : view.points.data()) {
-      if (!point.allFinite()) point.setConstant(kUnknown);
-    }
-  }
+  if (points_) view.points = NextPoints();
+  if (valid_) ForgetInvalid(view);
   return view;
+}
+
+// A single number is both.
+std::optional<Eigen::Vector2d> ArrayViews::NextVector(std::optional<Stack>& stack) {
+  if (!stack) return std::nullopt;
+  std::array<double, 2> values{};
+  const size_t num_values = stack->view_shape[0];
+  stack->reader.Read(std::span<double>(values).first(num_values));
+  return Eigen::Vector2d(values[0], values[num_values - 1]);
+}
+
+Grid<Eigen::Vector3f> ArrayViews::NextPoints() {
+  static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float));
+  Grid<Eigen::Vector3f> points(map_size_->width, map_size_->height);
+  points_->reader.Read(std::span<float>(points.data().front().data(), 3 * points.size()));
+  for (Eigen::Vector3f& point : points.data()) {
+    if (!point.allFinite()) point.setConstant(kUnknown);
+  }
+  return points;
+}
+
+void ArrayViews::ForgetInvalid(ViewArrays& view) {
+  const Grid<float> valid = NextMap(valid_->reader, *map_size_);
+  for (size_t i = 0; i < valid.size(); ++i) {
+    if (valid.data()[i] > 0.0f) continue;
+    if (depth_) view.depth.data()[i] = kUnknown;
+    if (points_) view.points.data()[i].setConstant(kUnknown);
+  }
 }
 
 DistractorMask ArrayViews::NextDistractor() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/colmap_model.h"
 #include "bridge/import_cameras.h"
+#include "bridge/import_loaders.h"
 #include "bridge/importer.h"
 #include "scene/error.h"
 #include "scene/reconstruction.h"
@@ -37,17 +38,47 @@ std::string SizeText(const ImageSize& size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-Camera RescaleToPhoto(const fs::path& path, const Camera& camera, const Photo& photo) {
+// What a model says of a photo, in the photo's own pixels.
+struct Placement {
+  Camera camera;
+  PixelMap original_from_model = IdentityPixelMap();
+};
+
+Placement RescaleToPhoto(const fs::path& path, const Camera& camera, const Photo& photo) {
   const ImageSize model_size = {camera.width, camera.height};
-  if (model_size == photo.size) return camera;
+  if (model_size == photo.size) return {camera};
   if (!IsResized(model_size, photo.size)) {
     Fail(path,
          "the camera of " + Printable(photo.name) + " is for " + SizeText(model_size) +
              " pixels but the photo has " + SizeText(photo.size),
          "the photo resized with its aspect",
-         "undo crops and rotations (EXIF orientation), or name the model's photos by --image_path");
+         "undo crops and rotations (EXIF orientation), name the model's photos by --image_path, or "
+         "say --resize crop if MapAnything cut them");
   }
-  return Rescale(camera, photo.size.width, photo.size.height);
+  Placement placement{Rescale(camera, photo.size.width, photo.size.height)};
+  placement.original_from_model.leftCols<2>() =
+      Eigen::Vector2d(static_cast<double>(photo.size.width) / static_cast<double>(camera.width),
+                      static_cast<double>(photo.size.height) / static_cast<double>(camera.height))
+          .asDiagonal();
+  return placement;
+}
+
+// MapAnything's demo_colmap.py writes cameras of the cut and resized images that it saves beside
+// sparse/ under the photos' names. Source: facebookresearch/map-anything: scripts/demo_colmap.py,
+// mapanything/utils/colmap_export.py.
+Placement UndoCrop(const ImportJob& job, const Camera& camera, const Photo& photo) {
+  const MapSize model_size = {static_cast<int>(camera.width), static_cast<int>(camera.height)};
+  const NetworkGeometry geometry =
+      ResolveMapAnything(job.input_path, job.image_folder, {photo}, model_size).front();
+  const Eigen::Vector2d scale = geometry.original_from_network.leftCols<2>().diagonal();
+  const Eigen::Vector2d cut_px = geometry.original_from_network.col(2).cwiseQuotient(scale);
+  Camera uncut = camera;
+  uncut.width =
+      static_cast<uint64_t>(std::llround(static_cast<double>(photo.size.width) / scale.x()));
+  uncut.height =
+      static_cast<uint64_t>(std::llround(static_cast<double>(photo.size.height) / scale.y()));
+  uncut.SetPrincipalPoint(camera.PrincipalPoint() + cut_px);
+  return {Rescale(uncut, photo.size.width, photo.size.height), geometry.original_from_network};
 }
 
 // projection - xy of the observations in front of the camera, in the model's pixels.
@@ -109,11 +140,11 @@ class ColmapImport {
     imported.pose = {image.cam_from_world, false, RotationForm::kQuaternionWxyz};
     View& view = imported.prediction.view;
     view.name = photo.name;
-    view.camera = RescaleToPhoto(job_.input_path, model_camera, photo);
+    const Placement placement = job_.options.resize == ImportResize::kCrop
+                                    ? UndoCrop(job_, model_camera, photo)
+                                    : RescaleToPhoto(job_.input_path, model_camera, photo);
+    view.camera = placement.camera;
     view.cam_from_world = CamFromWorld(imported.pose, job_.options.repair);
-    const Eigen::Vector2d scale(
-        static_cast<double>(photo.size.width) / static_cast<double>(model_camera.width),
-        static_cast<double>(photo.size.height) / static_cast<double>(model_camera.height));
     const ImageSize model_size = {model_camera.width, model_camera.height};
     if (model_size != photo.size) {
       ++num_images_by_rescale_["from " + SizeText(model_size) + " to " + SizeText(photo.size)];
@@ -121,19 +152,19 @@ class ColmapImport {
     const Eigen::Vector2d shift =
         DetectShift(Residuals(model_, model_camera, view.cam_from_world, image));
     if (!shift.isZero()) ++NumImagesWithShift(shift);
-    AddSamples(image, shift, scale, imported);
+    AddSamples(image, shift, placement.original_from_model, imported);
     return imported;
   }
 
   // Pixels of observed points with z of cam_from_world * point as depth.
   void AddSamples(const Image& image,
                   const Eigen::Vector2d& shift,
-                  const Eigen::Vector2d& scale,
+                  const PixelMap& original_from_model,
                   ImportedView& imported) {
     for (const Point2D& point2D : image.points2D) {
       if (!point2D.HasPoint3D()) continue;
       const Eigen::Vector3d& point_in_world = model_.points3D.at(point2D.point3D_id).xyz;
-      const Eigen::Vector2d pixel = scale.cwiseProduct(point2D.xy + shift);
+      const Eigen::Vector2d pixel = Apply(original_from_model, point2D.xy + shift);
       imported.anchors.push_back({point_in_world, pixel});
       const double depth = (imported.prediction.view.cam_from_world * point_in_world).z();
       const DepthSample sample = {pixel.cast<float>(), static_cast<float>(depth), 1.0f};
@@ -197,6 +228,7 @@ void Read(const ImportJob& job, const ViewSink& sink, ImportSummary& summary) {
     summary.warnings.push_back(warning);
   }
   ColmapImport(job, summary).Read(sink);
+  if (job.options.resize == ImportResize::kCrop) summary.resize = ImportResize::kCrop;
 }
 
 }  // namespace

@@ -120,6 +120,25 @@ std::string_view ResizeName(ImportResize resize) {
   return resize == ImportResize::kAuto ? "auto" : RowOf(resize).name;
 }
 
+MapSize MapSizeFromMiddle(const std::filesystem::path& path,
+                          size_t camera_idx,
+                          const Eigen::Vector2d& principal_point) {
+  constexpr double kMaxRounding = 1e-3;
+  constexpr double kMaxSide = 1 << 15;
+  const Eigen::Vector2d sides = 2.0 * principal_point;
+  const auto is_size = [](double side) {
+    return side >= 2.0 && side <= kMaxSide && std::abs(side - std::round(side)) < kMaxRounding;
+  };
+  if (!is_size(sides.x()) || !is_size(sides.y())) {
+    Fail(path,
+         "the principal point of camera " + std::to_string(camera_idx) + " is (" +
+             std::to_string(principal_point.x()) + ", " + std::to_string(principal_point.y()) + ")",
+         "the middle of the network's input, which tells its size",
+         "give the intrinsics in original pixels by --camera_params");
+  }
+  return {static_cast<int>(std::lround(sides.x())), static_cast<int>(std::lround(sides.y()))};
+}
+
 ResolvedResize ResolveResize(const std::filesystem::path& path,
                              const std::vector<ImageSize>& photo_sizes,
                              const std::vector<MapSize>& map_sizes,

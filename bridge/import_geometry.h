@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
+
 namespace vgtw {
 
 // Size of per-pixel maps.
@@ -17,6 +19,12 @@ struct MapSize {
   int height = 0;
   auto operator<=>(const MapSize&) const = default;
 };
+
+// The size of a network's input, whose principal point is its middle: twice that. For formats that
+// write intrinsics and no maps. Throws Error naming `camera_idx` if the sides are not whole pixels.
+MapSize MapSizeFromMiddle(const std::filesystem::path& path,
+                          size_t camera_idx,
+                          const Eigen::Vector2d& principal_point);
 
 struct ResolvedResize {
   ImportResize resize = ImportResize::kAuto;

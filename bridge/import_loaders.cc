@@ -131,6 +131,15 @@ std::optional<NetworkGeometry> Dust3rGeometry(const ImageSize& photo_size,
   return CropOf(photo_size, resized, centre_x - half_width, centre_y - half_height, map_size);
 }
 
+MapSize DefaultDust3rMapSize(const ImageSize& photo_size) {
+  constexpr int kDefaultSize = 512;
+  constexpr int kPatch = 16;
+  const Resized resized = ScaleLongestSide(photo_size, kDefaultSize);
+  const auto patches = [](int64_t side) { return static_cast<int>(side / kPatch * kPatch); };
+  const bool is_square = resized.width == resized.height;
+  return {patches(resized.width), is_square ? kDefaultSize * 3 / 4 : patches(resized.height)};
+}
+
 std::vector<NetworkGeometry> ResolveDust3r(const std::filesystem::path& path,
                                            const std::filesystem::path& image_folder,
                                            const std::vector<Photo>& photos,
@@ -186,6 +195,73 @@ std::optional<std::vector<NetworkGeometry>> DepthAnything3Geometries(
                                 (resized.width - map_size.width) / 2,
                                 (resized.height - map_size.height) / 2,
                                 map_size));
+  }
+  return geometries;
+}
+
+std::optional<NetworkGeometry> MapAnythingGeometry(const ImageSize& photo_size,
+                                                   const MapSize& map_size) {
+  constexpr double kCover = 1e-8;  // the loader adds it so that rounding down still covers the map
+  const auto width = static_cast<double>(photo_size.width);
+  const auto height = static_cast<double>(photo_size.height);
+  const double scale = std::max(map_size.width / width, map_size.height / height) + kCover;
+  const Resized resized = {static_cast<int64_t>(width * scale),
+                           static_cast<int64_t>(height * scale)};
+  const bool fits = resized.width >= map_size.width && resized.height >= map_size.height &&
+                    resized.width <= 2 * int64_t{map_size.width} &&
+                    resized.height <= 2 * int64_t{map_size.height};
+  if (!fits) return std::nullopt;
+  return CropOf(photo_size,
+                resized,
+                (resized.width - map_size.width) / 2,
+                (resized.height - map_size.height) / 2,
+                map_size);
+}
+
+std::vector<NetworkGeometry> ResolveMapAnything(const std::filesystem::path& path,
+                                                const std::filesystem::path& image_folder,
+                                                const std::vector<Photo>& photos,
+                                                const MapSize& map_size) {
+  std::vector<NetworkGeometry> geometries;
+  for (const Photo& photo : photos) {
+    CheckOrientation(image_folder / photo.name);
+    const std::optional<NetworkGeometry> geometry = MapAnythingGeometry(photo.size, map_size);
+    if (!geometry) {
+      Fail(path,
+           SizesText(map_size, photo),
+           "the centre that MapAnything's loader cuts out",
+           "name the photos that the network saw by --image_path");
+    }
+    geometries.push_back(*geometry);
+  }
+  return geometries;
+}
+
+std::vector<NetworkGeometry> ResolvePi3(const std::filesystem::path& path,
+                                        const std::vector<Photo>& photos,
+                                        const MapSize& map_size) {
+  // Rounding to patches, and another patch to stay below the limit.
+  constexpr double kMaxDeviation = 1.5 * 14;
+  const ImageSize& first = photos.front().size;
+  const double scale =
+      std::sqrt(static_cast<double>(map_size.width) * map_size.height /
+                (static_cast<double>(first.width) * static_cast<double>(first.height)));
+  const auto deviates = [&](uint64_t photo_side, int map_side) {
+    return std::abs(scale * static_cast<double>(photo_side) - map_side) > kMaxDeviation;
+  };
+  if (deviates(first.width, map_size.width) || deviates(first.height, map_size.height)) {
+    Fail(path,
+         SizesText(map_size, photos.front()),
+         "the aspect of the first photo, as pi3's loader gives it",
+         "name the photos that the network saw by --image_path");
+  }
+  std::vector<NetworkGeometry> geometries;
+  for (const Photo& photo : photos) {
+    geometries.push_back(MakeNetworkGeometry(ResizePolicy::kStretch,
+                                             photo.size.width,
+                                             photo.size.height,
+                                             map_size.width,
+                                             map_size.height));
   }
   return geometries;
 }

@@ -76,12 +76,8 @@ bool HasExtrinsic(const ArrayStore& store) {
   return store.Contains("extrinsic") || store.Contains("extrinsics");
 }
 
-bool IsZipFile(const fs::path& path) {
-  return fs::is_regular_file(path) && path.extension() == ".npz";
-}
-
 bool HoldsArrays(const fs::path& path) {
-  return (IsZipFile(path) || fs::is_directory(path)) && HasExtrinsic(*OpenArrayStore(path));
+  return (IsNpzFile(path) || fs::is_directory(path)) && HasExtrinsic(*OpenArrayStore(path));
 }
 
 // --- All views in one store -----------------------------------------------------------------
@@ -104,18 +100,18 @@ std::optional<fs::path> LocateDepthAnything3(const fs::path& input_path, const P
                              "exports/npz/results.npz",
                              "exports/mini_npz/results.npz"}) {
     const fs::path file = inside[0] == '\0' ? input_path : input_path / inside;
-    if (IsZipFile(file) && IsDepthAnything3(*OpenArrayStore(file))) return file;
+    if (IsNpzFile(file) && IsDepthAnything3(*OpenArrayStore(file))) return file;
   }
   return std::nullopt;
 }
 
 std::optional<fs::path> LocateStack(const fs::path& input_path, const PhotoIndex&) {
   const auto holds_stack = [](const fs::path& path) {
-    return HoldsArrays(path) && !(IsZipFile(path) && IsDepthAnything3(*OpenArrayStore(path)));
+    return HoldsArrays(path) && !(IsNpzFile(path) && IsDepthAnything3(*OpenArrayStore(path)));
   };
   if (holds_stack(input_path)) return input_path;
   const fs::path inside = input_path / "predictions.npz";
-  if (fs::is_directory(input_path) && IsZipFile(inside) && holds_stack(inside)) return inside;
+  if (fs::is_directory(input_path) && IsNpzFile(inside) && holds_stack(inside)) return inside;
   return std::nullopt;
 }
 
@@ -191,8 +187,8 @@ std::vector<StoreOfPhoto> FindStores(const fs::path& folder, const PhotoIndex& p
        fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied)) {
     const fs::path relative = entry.path().lexically_relative(folder);
     const fs::path name =
-        IsZipFile(entry.path()) ? fs::path(relative).replace_extension() : relative;
-    const bool may_hold = IsZipFile(entry.path()) || entry.is_directory();
+        IsNpzFile(entry.path()) ? fs::path(relative).replace_extension() : relative;
+    const bool may_hold = IsNpzFile(entry.path()) || entry.is_directory();
     const std::optional<size_t> photo_idx =
         may_hold ? photos.Find(name.generic_string(), true) : std::nullopt;
     if (photo_idx && HoldsArrays(entry.path())) stores.push_back({entry.path(), *photo_idx});

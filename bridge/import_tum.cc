@@ -16,11 +16,9 @@ namespace fs = std::filesystem;
 
 constexpr size_t kMaxBytes = size_t{1} << 30;
 
-std::optional<fs::path> Locate(const fs::path& input_path, const PhotoIndex& photos) {
+std::optional<fs::path> Locate(const fs::path& input_path, const PhotoIndex&) {
   constexpr size_t kProbeBytes = 1 << 16;
   if (!fs::is_regular_file(input_path)) return std::nullopt;
-  // Looks the same but for the order of its quaternions.
-  if (kMonst3rImporter.locate(input_path, photos)) return std::nullopt;
   const MappedFile file(input_path);
   const std::string_view text(reinterpret_cast<const char*>(file.bytes().data()),
                               std::min(kProbeBytes, file.bytes().size()));

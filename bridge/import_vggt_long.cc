@@ -5,7 +5,6 @@
 #include "scene/error.h"
 #include "scene/files.h"
 
-#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -49,23 +48,6 @@ struct NetworkCameras {
   std::vector<NetworkGeometry> geometries;
 };
 
-// Twice the principal point.
-MapSize SizeOf(const fs::path& path, size_t photo_idx, double cx, double cy) {
-  constexpr double kMaxRounding = 1e-3;
-  constexpr double kMaxSide = 1 << 15;
-  const auto is_size = [](double side) {
-    return side >= 2.0 && side <= kMaxSide && std::abs(side - std::round(side)) < kMaxRounding;
-  };
-  if (!is_size(2.0 * cx) || !is_size(2.0 * cy)) {
-    Fail(path,
-         "the principal point of camera " + std::to_string(photo_idx) + " is (" +
-             std::to_string(cx) + ", " + std::to_string(cy) + ")",
-         "the middle of the network's input, which tells its size",
-         "give the intrinsics in original pixels by --camera_params");
-  }
-  return {static_cast<int>(std::lround(2.0 * cx)), static_cast<int>(std::lround(2.0 * cy))};
-}
-
 NetworkCameras ReadCameras(const ImportJob& job, const fs::path& path, ImportSummary& summary) {
   const auto rows = ParseNumberRows(ReadFile(path, kMaxBytes), 4, path.string());
   CheckOnePerPhoto(job, rows.size(), "lines of intrinsics");
@@ -77,7 +59,7 @@ NetworkCameras ReadCameras(const ImportJob& job, const fs::path& path, ImportSum
     Eigen::Matrix3d intrinsic;
     intrinsic << row[0], 0.0, row[2], 0.0, row[1], row[3], 0.0, 0.0, 1.0;
     cameras.intrinsics.push_back(intrinsic);
-    map_sizes.push_back(SizeOf(path, i, row[2], row[3]));
+    map_sizes.push_back(MapSizeFromMiddle(path, i, {row[2], row[3]}));
     photo_sizes.push_back(job.photos[i].size);
   }
   ResolvedResize resolved = ResolveResize(path, photo_sizes, map_sizes, job.options.resize);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/import_views.h"
 
+#include "bridge/import_loaders.h"
 #include "scene/error.h"
 #include "scene/network_pixels.h"
 
@@ -71,10 +72,11 @@ void ViewImport::Add(size_t photo_idx, NetworkView network_view) {
 
 void ViewImport::Finish() {
   if (!bad_views_.empty()) {
-    summary_.warnings.push_back(std::to_string(bad_views_.size()) +
-                                " views are left out: their pose or intrinsics are not finite or "
-                                "have no positive focal length (first: " +
-                                Printable(bad_views_.front()) + ")");
+    summary_.warnings.push_back(
+        std::to_string(bad_views_.size()) +
+        " views are left out: their pose or intrinsics are not finite or "
+        "have no positive focal length, or their points fit no pinhole camera (first: " +
+        Printable(bad_views_.front()) + ")");
   }
   if (const std::string warning = cameras_.Warning(); !warning.empty()) {
     summary_.warnings.push_back(warning);
@@ -100,6 +102,23 @@ void CheckOnePerPhoto(const ImportJob& job, size_t num_found, const std::string&
        "holds " + std::to_string(num_found) + " " + what,
        "one for each of the " + std::to_string(job.photos.size()) + " photos",
        "name the folder that the network saw by --image_path");
+}
+
+Eigen::Matrix3d MiddleIntrinsics(const Eigen::Vector2d& focal, const MapSize& map_size) {
+  return Eigen::Matrix3d{{focal.x(), 0.0, 0.5 * map_size.width},
+                         {0.0, focal.y(), 0.5 * map_size.height},
+                         {0.0, 0.0, 1.0}};
+}
+
+std::vector<MapSize> DefaultDust3rSizes(const ImportJob& job, ImportSummary& summary) {
+  std::vector<MapSize> sizes;
+  for (const Photo& photo : job.photos) sizes.push_back(DefaultDust3rMapSize(photo.size));
+  summary.warnings.push_back(
+      "nothing tells the size of the network's images, to which the focal "
+      "lengths belong: supposed to be the loader's default, " +
+      std::to_string(sizes.front().width) + "x" + std::to_string(sizes.front().height) +
+      "; else give them by --camera_params");
+  return sizes;
 }
 
 void NotePhotosLeftOut(const ImportJob& job, size_t num_read, ImportSummary& summary) {

@@ -58,6 +58,13 @@ FilePose PoseFromMatrix(const std::filesystem::path& path,
 // names: their frames are the photos in the order of their names.
 void CheckOnePerPhoto(const ImportJob& job, size_t num_found, const std::string& what);
 
+// Intrinsics in pixels of a map whose principal point is its middle.
+Eigen::Matrix3d MiddleIntrinsics(const Eigen::Vector2d& focal, const MapSize& map_size);
+
+// What DUSt3R's loader makes of the photos at its default size; adds the warning that it is a
+// guess. For focal lengths in network pixels without anything that tells the network's size.
+std::vector<MapSize> DefaultDust3rSizes(const ImportJob& job, ImportSummary& summary);
+
 // Adds how many photos had nothing to read, if any.
 void NotePhotosLeftOut(const ImportJob& job, size_t num_read, ImportSummary& summary);
 

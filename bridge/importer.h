@@ -51,6 +51,9 @@ struct Importer {
   std::optional<std::filesystem::path> (*locate)(const std::filesystem::path& input_path,
                                                  const PhotoIndex& photos);
   void (*read)(const ImportJob& job, const ViewSink& sink, ImportSummary& summary);
+  // Whose files look the same but for what tells this format apart: if both are recognised, this is
+  // meant.
+  const Importer* special_case_of = nullptr;
 };
 
 extern const Importer kColmapImporter;
@@ -61,5 +64,10 @@ extern const Importer kTumImporter;
 extern const Importer kLlffImporter;
 extern const Importer kMonst3rImporter;
 extern const Importer kVggtLongImporter;
+extern const Importer kCut3rImporter;
+extern const Importer kDust3rImporter;
+extern const Importer kFast3rImporter;
+extern const Importer kPi3Importer;
+extern const Importer kMapAnythingImporter;
 
 }  // namespace vgtw

@@ -131,6 +131,10 @@ bool ArrayStore::Contains(const std::string& key) const {
   return std::binary_search(keys().begin(), keys().end(), key);
 }
 
+bool IsNpzFile(const fs::path& path) {
+  return fs::is_regular_file(path) && path.extension() == ".npz";
+}
+
 NpyReader OpenNpyFile(const fs::path& path) {
   std::shared_ptr<std::FILE> file(std::fopen(path.c_str(), "rbe"),
                                   [](std::FILE* closing) { closing&& std::fclose(closing); });

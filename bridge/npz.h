@@ -38,6 +38,9 @@ class ArrayStore {
 // A single .npy file. Throws Error if it is missing or damaged.
 NpyReader OpenNpyFile(const std::filesystem::path& path);
 
+// By its name.
+bool IsNpzFile(const std::filesystem::path& path);
+
 // Throws Error if `path` is neither a folder nor a zip archive.
 std::unique_ptr<ArrayStore> OpenArrayStore(const std::filesystem::path& path);
 

@@ -11,10 +11,15 @@ namespace {
 
 const std::map<std::string, ImportFormat> kFormats = {{"auto", ImportFormat::kAuto},
                                                       {"colmap", ImportFormat::kColmap},
+                                                      {"cut3r", ImportFormat::kCut3r},
                                                       {"da3_npz", ImportFormat::kDa3Npz},
+                                                      {"dust3r", ImportFormat::kDust3r},
+                                                      {"fast3r", ImportFormat::kFast3r},
                                                       {"llff", ImportFormat::kLlff},
+                                                      {"mapanything", ImportFormat::kMapAnything},
                                                       {"monst3r", ImportFormat::kMonst3r},
                                                       {"npz_folder", ImportFormat::kNpzFolder},
+                                                      {"pi3", ImportFormat::kPi3},
                                                       {"tum", ImportFormat::kTum},
                                                       {"vggt_long", ImportFormat::kVggtLong},
                                                       {"vggt_npz", ImportFormat::kVggtNpz}};
@@ -88,7 +93,9 @@ struct ImportCommand {
 std::function<void()> DeclareImport(Flags& flags) {
   const auto command = std::make_shared<ImportCommand>();
   flags.Group("Input")
-      .Require("input_path", &command->input_path, "COLMAP model, .npz, folder, or trajectory")
+      .Require("input_path",
+               &command->input_path,
+               "COLMAP model, .npz, folder or trajectory; docs/import.md")
       .Require("image_path", &command->image_path, "The original photos")
       .AddChoice("format", &command->format, Keys(kFormats), "What lies at --input_path")
       .AddChoice("resize",

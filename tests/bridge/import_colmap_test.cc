@@ -127,6 +127,50 @@ TEST(ImportColmap, CamerasOfAnotherSizeAreRescaled) {
   EXPECT_LT(CompareSamples(model, prediction).pixel, 1e-4);
 }
 
+// MapAnything: sparse/ for its own cut images, which it saves in images/ under the photos' names.
+// Photos of 1920x1200 cover 640x480 as 768x480; columns 64 to 703 are kept: a scale of 2.5.
+TEST(ImportColmap, CropsOfMapAnythingAreUndoneOnRequest) {
+  const Reconstruction model = Model();
+  Case asks(model, 1920, 1200);
+  EXPECT_NE(asks.Message().find("--resize crop"), std::string::npos) << asks.Message();
+  Case test(model, 1920, 1200);
+  const ImportSummary summary = test.Run({.resize = ImportResize::kCrop});
+  EXPECT_EQ(summary.resize, ImportResize::kCrop);
+  const Prediction prediction = ReadPrediction(test.output);
+  const Camera& before = model.cameras.begin()->second;
+  const Camera& after = prediction.views[0].view.camera;
+  EXPECT_EQ(after.width, 1920u);
+  EXPECT_EQ(after.height, 1200u);
+  EXPECT_NEAR(after.params[0], 2.5 * before.params[0], 1e-9);
+  EXPECT_NEAR(after.params[2], 2.5 * (before.params[2] + 64.0), 1e-9);
+  EXPECT_NEAR(after.params[3], 2.5 * before.params[3], 1e-9);
+  const SampleErrors errors = CompareSamples(model, prediction);
+  EXPECT_EQ(errors.num_samples, 6u * 120);
+  EXPECT_LT(errors.pixel, 2e-4);  // samples are float: 6e-5 px at 1920, in both axes
+}
+
+TEST(ImportColmap, ImagesOfMapAnythingFitAsTheyAre) {
+  Reconstruction model = Model();
+  Case test(model);
+  test.Run({.resize = ImportResize::kCrop});
+  const Prediction cropped = ReadPrediction(test.output);
+  Case plain(model);
+  plain.Run();
+  const Prediction read = ReadPrediction(plain.output);
+  EXPECT_EQ(cropped.views[3].view.camera, read.views[3].view.camera);
+}
+
+TEST(ImportColmap, CropsThatCannotBeAreNamed) {
+  Case test(Model(), 4000, 500);
+  try {
+    test.Run({.resize = ImportResize::kCrop});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("640x480 for p0.png of 4000x500"), std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(ImportColmap, PhotosOfAnotherAspectAreAnError) {
   const std::string rotated = Case(Model(), 480, 640).Message();
   EXPECT_NE(rotated.find("is for 640x480 pixels but the photo has 480x640"), std::string::npos)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/import_loaders.h"
 
+#include "scene/error.h"
+
 #include <gtest/gtest.h>
 
 namespace vgtw {
@@ -51,6 +53,42 @@ TEST(Dust3rGeometry, OtherSizesAreRefused) {
   EXPECT_FALSE(Dust3rGeometry({1080, 1920}, {512, 288}));
   EXPECT_FALSE(Dust3rGeometry({1000000, 1}, {512, 16}));
   EXPECT_FALSE(Dust3rGeometry({1, 1000000}, {2, 2}));
+}
+
+TEST(DefaultDust3rMapSize, IsTheSizeThatTheLoaderGives) {
+  EXPECT_EQ(DefaultDust3rMapSize({1920, 1080}), (MapSize{512, 288}));
+  EXPECT_EQ(DefaultDust3rMapSize({682, 1024}), (MapSize{336, 512}));
+  EXPECT_EQ(DefaultDust3rMapSize({1000, 1000}), (MapSize{512, 384}));
+  for (const ImageSize& photo : {ImageSize{1000, 667}, {64, 48}, {3, 4}, {999, 1000}}) {
+    EXPECT_TRUE(Dust3rGeometry(photo, DefaultDust3rMapSize(photo)));
+  }
+}
+
+TEST(MapAnythingGeometry, WhatOverhangsIsCutOnBothSides) {
+  // 4032x3024 covers 518x392 as floor(522.67) x 392: two columns go on each side.
+  const auto wide = MapAnythingGeometry({4032, 3024}, {518, 392});
+  ASSERT_TRUE(wide);
+  EXPECT_NEAR(wide->original_from_network(0, 0), 4032.0 / 522.0, 1e-12);
+  EXPECT_NEAR(wide->original_from_network(0, 2), 2.0 * 4032.0 / 522.0, 1e-12);
+  EXPECT_NEAR(wide->original_from_network(1, 1), 3024.0 / 392.0, 1e-12);
+  EXPECT_EQ(wide->original_from_network(1, 2), 0.0);
+  // 1080x1920 covers 294x518 as 294 x floor(522.67); of three rows too much one goes on top.
+  const auto upright = MapAnythingGeometry({1080, 1920}, {294, 519});
+  ASSERT_TRUE(upright);
+  EXPECT_NEAR(upright->original_from_network(1, 2), 1920.0 / 522.0, 1e-12);
+  EXPECT_FALSE(MapAnythingGeometry({1920, 500}, {294, 518}));
+  EXPECT_FALSE(MapAnythingGeometry({1, 1000000}, {518, 518}));
+}
+
+TEST(ResolvePi3, PhotosAreStretchedToTheFirstOnesAspect) {
+  // 255000 pixels at 16:9 are 673.3 x 378.7: 48 x 27 patches.
+  const std::vector<Photo> photos = {{"a", {1920, 1080}}, {"b", {600, 600}}};
+  const auto geometries = ResolvePi3("p", photos, {672, 378});
+  ASSERT_EQ(geometries.size(), 2u);
+  EXPECT_TRUE(
+      Apply(geometries[1].original_from_network, {672, 378}).isApprox(Eigen::Vector2d(600, 600)));
+  EXPECT_THROW(ResolvePi3("p", photos, {378, 672}), Error);
+  EXPECT_THROW(ResolvePi3("p", {photos[1], photos[0]}, {672, 378}), Error);
 }
 
 TEST(DepthAnything3Geometries, WholePhotosAreStretchedToPatches) {

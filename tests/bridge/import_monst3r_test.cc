@@ -200,7 +200,7 @@ TEST(ImportMonst3r, ShapesMustFit) {
   ExpectHas(depth.Message(), "16x16 for 00011.png of 64x48");
   Case conf;
   conf.Write("conf_1.npy", NpyFloats("(16, 16)", small));
-  ExpectHas(conf.Message(), "32x16 like the frame's depth");
+  ExpectHas(conf.Message(), "expected 32x16");
   Case mask;
   WriteImage(mask.input / "dynamic_mask_0.png", GrayImage(64, 48));
   ExpectHas(mask.Message(), "64x48");
@@ -235,6 +235,103 @@ TEST(ImportMonst3r, NumbersThatAreNotFiniteNameTheirLine) {
   EXPECT_EQ(summary.num_views, 2u);
   ASSERT_EQ(summary.warnings.size(), 1u);
   ExpectHas(summary.warnings[0], "00010.png");
+}
+
+// eval/relpose of CUT3R: the same trajectory, pred_focal.txt, pred_intrinsics.txt, no maps. The
+// size is twice the principal point, the scale 2.
+struct Cut3rCase : Case {
+  Cut3rCase() {
+    for (const fs::directory_entry& entry : fs::directory_iterator(input)) {
+      if (entry.path().extension() != ".txt") fs::remove(entry.path());
+    }
+    Write("pred_focal.txt", "400.000000\n408.000000\n416.000000\n");
+  }
+  View ReadThird() const { return ReadPrediction(output).views[2].view; }
+  void ExpectTruePose() const {
+    const Eigen::Matrix<double, 3, 4> truth = Inverse(Truth(2)).ToMatrix();
+    EXPECT_LT((ReadThird().cam_from_world.ToMatrix() - truth).norm(), 1e-9);
+  }
+};
+
+TEST(ImportMonst3r, FoldersOfCut3rsEvaluationHoldPosesAlone) {
+  Cut3rCase test;
+  const ImportSummary summary = test.Run();
+  EXPECT_EQ(summary.format, ImportFormat::kMonst3r);
+  EXPECT_EQ(summary.num_views_with_depth, 0u);
+  EXPECT_TRUE(summary.warnings.empty());
+  test.ExpectTruePose();
+  EXPECT_EQ(test.ReadThird().camera.params, (std::vector<double>{61, 61, 32, 24}));
+  Cut3rCase off_centre;
+  off_centre.Write("pred_intrinsics.txt",
+                   "30 0 16 0 30 8 0 0 1\n30 0 16.2 0 30 8 0 0 1\n30 0 16 0 30 8 0 0 1\n");
+  ExpectHas(off_centre.Message(), "principal point of camera 1");
+}
+
+// 64x48 becomes 512x384 by default: a scale of 1/8.
+TEST(ImportMonst3r, FocalLengthsAloneAreOfTheLoadersDefaultSize) {
+  Cut3rCase test;
+  fs::remove(test.input / "pred_intrinsics.txt");
+  const ImportSummary summary = test.Run();
+  ASSERT_EQ(summary.warnings.size(), 1u);
+  ExpectHas(summary.warnings[0], "512x384");
+  test.ExpectTruePose();
+  EXPECT_EQ(test.ReadThird().camera.params, (std::vector<double>{52, 52, 32, 24}));
+  Cut3rCase given;
+  fs::remove(given.input / "pred_intrinsics.txt");
+  EXPECT_TRUE(given.Run({.camera_params = "70"}).warnings.empty());
+  EXPECT_EQ(given.ReadThird().camera.params, (std::vector<double>{70, 70, 32, 24}));
+  Cut3rCase fewer;
+  fs::remove(fewer.input / "pred_intrinsics.txt");
+  fewer.Write("pred_focal.txt", "400\n");
+  ExpectHas(fewer.Message(), "1 focal lengths");
+}
+
+TEST(ImportMonst3r, ATrajectoryOfThatNameIsReadScalarFirst) {
+  Cut3rCase test;
+  fs::remove(test.input / "pred_intrinsics.txt");
+  fs::remove(test.input / "pred_focal.txt");
+  const ImportSummary summary = test.Run({.camera_params = "70"});
+  EXPECT_EQ(summary.format, ImportFormat::kMonst3r);
+  ASSERT_EQ(summary.notes.size(), 3u);
+  ExpectHas(summary.notes[2], "--swap_quaternion_order");
+  test.ExpectTruePose();
+  // Who says so reads it as TUM.
+  Cut3rCase tum;
+  tum.input /= "pred_traj.txt";
+  tum.Run({.format = ImportFormat::kTum, .camera_params = "70"});
+  EXPECT_GT(AngleBetweenDeg(tum.ReadThird().cam_from_world.rotation, Inverse(Truth(2)).rotation),
+            10.0);
+}
+
+TEST(ImportMonst3r, MasksNeedASize) {
+  Case test;
+  for (const char* name : {"frame_0000.npy",
+                           "frame_0001.npy",
+                           "frame_0002.npy",
+                           "conf_0.npy",
+                           "conf_1.npy",
+                           "conf_2.npy",
+                           "pred_intrinsics.txt"}) {
+    fs::remove(test.input / name);
+  }
+  ExpectHas(test.Message(), "dynamic_mask_0.png: stands alone");
+}
+
+// Easi3R's demo leaves more masks and images in its folder.
+TEST(ImportMonst3r, OtherFilesOfEasi3rDoNoHarm) {
+  Case test;
+  for (const char* name : {"frames_dynamic_masks", "frames_fused_dynamic_masks"}) {
+    fs::create_directories(test.input / name);
+    WriteImage(test.input / name / "frame_0000.png", RgbImage(64, 64));
+  }
+  for (size_t i = 0; i < kNumFrames; ++i) {
+    const std::string n = std::to_string(i);
+    WriteImage(test.input / ("enlarged_dynamic_mask_" + n + ".png"),
+               GrayImage(kWidth, kHeight, 255));
+  }
+  test.Write("0_dynamic_masks.mp4", "");
+  EXPECT_EQ(test.Run().num_views_with_distractors, kNumFrames);
+  EXPECT_EQ(ReadPrediction(test.output).views[1].distractor(4, 1), 0.0f);
 }
 
 TEST(ImportMonst3r, StretchMeansARunWithoutCrop) {

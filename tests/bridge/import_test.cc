@@ -54,6 +54,20 @@ TEST(Import, UnknownInputsListTheFormats) {
   }
 }
 
+TEST(Import, FilesWithoutCamerasTellWhatToSave) {
+  Case test;
+  WriteFileAtomically(test.folder / "pi3.ply", "ply\n");
+  WriteFileAtomically(test.folder / "scene.glb", "glTF");
+  WriteFileAtomically(test.folder / "scene.pth", "PK");
+  for (const char* name : {"pi3.ply", "scene.glb"}) {
+    const std::string message = test.Message(test.folder / name);
+    EXPECT_NE(message.find("tells no camera"), std::string::npos) << message;
+    EXPECT_NE(message.find("camera_poses"), std::string::npos) << message;
+  }
+  const std::string message = test.Message(test.folder / "scene.pth");
+  EXPECT_NE(message.find("numpy.savez"), std::string::npos) << message;
+}
+
 TEST(Import, TwoFormatsInOneFolderNeedADecision) {
   Case test;
   const fs::path scene = test.folder / "scene";
