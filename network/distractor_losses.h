@@ -101,7 +101,8 @@ struct FeatureLosses {
 //            b_j the static token of view j that is most similar to a, w = max(0, s(a, b_j))
 // A view without static tokens adds nothing to L_cons; one view alone has no losses.
 // Both come from one search: a product of features per pair of views. Memory: one buffer like the
-// float32 features forward and another one backward, plus 24 bytes S^2 P; no (S P)^2 matrix.
+// float32 features forward and another one backward, plus 24 bytes S^2 P; no (S P)^2 matrix. On a
+// GPU the last bits of the gradient vary from run to run, as its sums have no fixed order.
 FeatureLosses ComputeFeatureLosses(const at::Tensor& features,
                                    const TokenLabels& labels,
                                    const FeatureLossOptions& options = {});

@@ -91,17 +91,17 @@ at::Tensor CameraLoss(const std::vector<at::Tensor>& encodings,
   options.Check();
   VGTW_CHECK(!encodings.empty(), "an iteration");
   VGTW_CHECK(true_encodings.dim() == 2 && true_encodings.size(1) == 9, "encodings [S, 9]");
-  const at::Tensor true_quaternions = true_encodings.slice(1, 3, 7);
   at::Tensor loss;
   for (const at::Tensor& encoding : encodings) {
     VGTW_CHECK(encoding.sizes() == true_encodings.sizes(), "one true encoding per view");
     const at::Tensor found = AtLeastFloat(encoding);
+    const at::Tensor truth = true_encodings.to(found.scalar_type());
     const at::Tensor quaternions = found.slice(1, 3, 7);
+    const at::Tensor true_quaternions = truth.slice(1, 3, 7);
     const at::Tensor is_other =
         (quaternions.detach() * true_quaternions).sum(1, /*keepdim=*/true) < 0.0;
     const auto part = [&](int64_t begin, int64_t end) {
-      return MeanError(
-          found.slice(1, begin, end), true_encodings.slice(1, begin, end), options.huber_scale);
+      return MeanError(found.slice(1, begin, end), truth.slice(1, begin, end), options.huber_scale);
     };
     const at::Tensor error = options.translation_weight * part(0, 3) +
                              options.rotation_weight *
@@ -132,8 +132,9 @@ at::Tensor DepthLoss(const at::Tensor& depth,
              "one confidence and one true depth per pixel");
   const at::Tensor is_known = IsKnownDepth(true_depth);
   const at::Tensor unknown = is_known.logical_not();
-  const at::Tensor error =
-      (AtLeastFloat(depth) - true_depth.masked_fill(unknown, 0.0)).masked_fill(unknown, 0.0);
+  const at::Tensor found = AtLeastFloat(depth);
+  const at::Tensor truth = true_depth.masked_fill(unknown, 0.0).to(found.scalar_type());
+  const at::Tensor error = (found - truth).masked_fill(unknown, 0.0);
   const at::Tensor c = AtLeastFloat(confidence);
   const at::Tensor weighted = (c * error.abs() - options.alpha * c.log()) * is_known;
   at::Tensor loss = weighted.sum() / is_known.sum().clamp_min(1);
