@@ -66,7 +66,7 @@ struct SceneStream::Impl {
     bool has_distractors = false;
     for (size_t i = 0; i < world->views.size(); ++i) {
       views.push_back(SeeView(*world, i));
-      has_distractors = has_distractors || !world->distractors[i].empty();
+      has_distractors = has_distractors || !world->distractors[i].pieces.empty();
     }
     if (!IsWithinLaws(views, has_distractors)) return std::nullopt;
     SceneSample sample;

@@ -157,18 +157,27 @@ StreamView SeeCoarsely(const Stage& stage, const Camera& camera, const Rigid3d& 
 double Overlap(const StreamView& from, const StreamView& to) {
   constexpr double kSameDepth = 0.1;  // relative; coarse pixels are large
   const Rigid3d to_from_from = to.cam_from_world * Inverse(from.cam_from_world);
+  const Eigen::Matrix3d rotation = to_from_from.rotation.toRotationMatrix();
+  const auto focal_lengths = [](const Camera& camera) {
+    return Eigen::Array2d(camera.FocalLengthX(), camera.FocalLengthY());
+  };
+  const Eigen::Array2d from_focal = focal_lengths(from.coarse_camera);
+  const Eigen::Array2d to_focal = focal_lengths(to.coarse_camera);
+  const Eigen::Array2d from_centre = from.coarse_camera.PrincipalPoint();
+  const Eigen::Array2d to_centre = to.coarse_camera.PrincipalPoint();
   int num_seen = 0;
   for (int y = 0; y < from.coarse.depth.height(); ++y) {
     for (int x = 0; x < from.coarse.depth.width(); ++x) {
-      const Eigen::Vector2d ray = *Unproject(from.coarse_camera, {x + 0.5, y + 0.5});
-      const Vector3d point = to_from_from * (from.coarse.depth(x, y) * ray.homogeneous());
-      const auto pixel = Project(to.coarse_camera, point);
-      if (!pixel || !(pixel->array() >= 0.0).all()) continue;
-      const Eigen::Vector2d nearest = pixel->cwiseMin(1e6);
-      const auto column = static_cast<int>(nearest.x());
-      const auto row = static_cast<int>(nearest.y());
-      if (!to.coarse.depth.Contains(column, row)) continue;
-      if (point.z() <= (1.0 + kSameDepth) * to.coarse.depth(column, row)) ++num_seen;
+      const Eigen::Vector2d ray = (Eigen::Array2d(x + 0.5, y + 0.5) - from_centre) / from_focal;
+      const Vector3d point =
+          from.coarse.depth(x, y) * (rotation * ray.homogeneous()) + to_from_from.translation;
+      if (point.z() <= 0.0) continue;
+      const Eigen::Array2d pixel = to_focal * point.hnormalized().array() + to_centre;
+      const bool is_inside = (pixel >= 0.0).all() && pixel.x() < 2.0 * to_centre.x() &&
+                             pixel.y() < 2.0 * to_centre.y();
+      if (!is_inside) continue;
+      const float depth = to.coarse.depth(static_cast<int>(pixel.x()), static_cast<int>(pixel.y()));
+      if (point.z() <= (1.0 + kSameDepth) * depth) ++num_seen;
     }
   }
   return static_cast<double>(num_seen) / static_cast<double>(from.coarse.depth.size());

@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-using PiecesByView = std::vector<std::vector<Piece>>;
+using ActorsByView = std::vector<Actors>;
 
 constexpr double kPi = std::numbers::pi;
 
@@ -28,13 +28,14 @@ class CoverMeter {
   double cover() const { return Mean(covers_); }
 
   // Adds the pieces unless they cover nothing, or all together too much.
-  bool Add(const PiecesByView& pieces, double max_cover) {
+  bool Add(const ActorsByView& actors, double max_cover) {
     constexpr double kMaxCoverOfView = 0.6;
     constexpr double kMinGain = 0.004;
     std::vector<HitMap> hits = hits_;
     std::vector<double> covers;
     for (size_t i = 0; i < views_.size(); ++i) {
-      CastInto(SeePieces(pieces[i], views_[i].coarse_camera, views_[i].cam_from_world), 0, hits[i]);
+      const StreamView& view = views_[i];
+      CastInto(SeePieces(actors[i].pieces, view.coarse_camera, view.cam_from_world), 0, hits[i]);
       covers.push_back(Cover(hits[i]));
       if (covers.back() > kMaxCoverOfView) return false;
     }
@@ -69,7 +70,7 @@ class Director {
     for (const StreamView& view : views) median_depths_.push_back(MedianDepth(view));
   }
 
-  PiecesByView Direct(const CastMember& member, DistractorKind way) {
+  ActorsByView Direct(const CastMember& member, DistractorKind way) {
     switch (way) {
       case kMovingDistractors:
         return random_.Chance(0.5) ? Pass(member) : Jump(member);
@@ -120,72 +121,76 @@ class Director {
                                                  : member.body;
   }
 
+  static Actors OnFloor(const Body& body, const Stand& stand) {
+    return {PlaceBody(body, stand), {{stand.place.head<2>(), stand.size * body.radius}}};
+  }
+
   // On a straight way through the scene, by less than its size to a few sizes a view.
-  PiecesByView Pass(const CastMember& member) {
+  ActorsByView Pass(const CastMember& member) {
     const size_t seen_from = DrawView();
     const Vector3d place = DrawPlace(member, seen_from);
     const double yaw_rad = DrawYaw();
     const double step = random_.Uniform(0.6, 2.5) * member.size * std::min(member.body.radius, 1.2);
     const Vector3d direction(std::cos(yaw_rad), std::sin(yaw_rad), 0.0);
-    PiecesByView pieces;
+    ActorsByView actors;
     for (size_t i = 0; i < views_.size(); ++i) {
       const double steps = static_cast<double>(i) - static_cast<double>(seen_from);
-      pieces.push_back(
-          PlaceBody(Animate(member), {place + steps * step * direction, yaw_rad, member.size}));
+      const Vector3d here = place + steps * step * direction;
+      actors.push_back(OnFloor(Animate(member), {here, yaw_rad, member.size}));
     }
-    return pieces;
+    return actors;
   }
 
   // Somewhere else in every view.
-  PiecesByView Jump(const CastMember& member) {
-    const double yaw_rad = DrawYaw();
+  ActorsByView Jump(const CastMember& member) {
     const bool turns = random_.Chance(0.5);
-    PiecesByView pieces;
+    double yaw_rad = DrawYaw();
+    ActorsByView actors;
     for (size_t i = 0; i < views_.size(); ++i) {
       const Vector3d place = DrawPlace(member, i);
-      pieces.push_back(
-          PlaceBody(Animate(member), {place, turns ? DrawYaw() : yaw_rad, member.size}));
+      if (turns) yaw_rad = DrawYaw();
+      actors.push_back(OnFloor(Animate(member), {place, yaw_rad, member.size}));
     }
-    return pieces;
+    return actors;
   }
 
   // In one place, but not in all views.
-  PiecesByView StayAway(const CastMember& member) {
+  ActorsByView StayAway(const CastMember& member) {
     const size_t present = DrawView();
     const size_t absent = (present + 1 + random_.Index(views_.size() - 1)) % views_.size();
     const Vector3d place = DrawPlace(member, present);
-    const std::vector<Piece> placed = PlaceBody(member.body, {place, DrawYaw(), member.size});
-    PiecesByView pieces(views_.size());
+    const Actors placed = OnFloor(member.body, {place, DrawYaw(), member.size});
+    ActorsByView actors(views_.size());
     for (size_t i = 0; i < views_.size(); ++i) {
       const bool is_here = random_.Chance(0.5);
-      if (i == present || (i != absent && is_here)) pieces[i] = placed;
+      if (i == present || (i != absent && is_here)) actors[i] = placed;
     }
-    return pieces;
+    return actors;
   }
 
   // In one place, another shape in every view.
-  PiecesByView Change(const CastMember& member) {
+  ActorsByView Change(const CastMember& member) {
     const Vector3d place = DrawPlace(member, DrawView());
     const double yaw_rad = DrawYaw();
     const double strength = random_.Uniform(0.2, 0.45);
-    PiecesByView pieces;
+    ActorsByView actors;
     for (size_t i = 0; i < views_.size(); ++i) {
       const double turned_rad = yaw_rad + random_.Uniform(-0.5, 0.5);
-      pieces.push_back(
-          PlaceBody(Deform(member.body, strength, random_), {place, turned_rad, member.size}));
+      const Body body = Deform(member.body, strength, random_);
+      actors.push_back(OnFloor(body, {place, turned_rad, member.size}));
     }
-    return pieces;
+    return actors;
   }
 
   // Close to the camera, reaching in from a border.
-  PiecesByView Occlude(const CastMember& member) {
+  ActorsByView Occlude(const CastMember& member) {
     const size_t present = DrawView();
-    PiecesByView pieces(views_.size());
+    ActorsByView actors(views_.size());
     for (size_t i = 0; i < views_.size(); ++i) {
       const bool is_here = random_.Chance(0.6);
-      if (i == present || is_here) pieces[i] = PlaceAtBorder(member, i);
+      if (i == present || is_here) actors[i].pieces = PlaceAtBorder(member, i);
     }
-    return pieces;
+    return actors;
   }
 
   std::vector<Piece> PlaceAtBorder(const CastMember& member, size_t view_idx) {
@@ -193,14 +198,12 @@ class Director {
     const double depth = random_.Uniform(0.2, 0.4) * median_depths_[view_idx];
     const Vector2d half_view = view.camera.PrincipalPoint() / view.camera.MeanFocalLength();
     const double half_size = random_.Uniform(0.3, 0.9) * half_view.maxCoeff() * depth;
-    const Vector2d across(random_.Chance(0.5) ? 1.0 : -1.0, random_.Uniform(-0.6, 0.6));
-    const bool is_from_below = random_.Chance(0.3);
-    const Vector2d border = is_from_below ? Vector2d(across.y(), 1.0) : across;
-    const Vector3d point_in_cam((border.cwiseProduct(half_view) * depth).homogeneous());
-    const Vector3d middle =
-        Inverse(view.cam_from_world) * Vector3d(point_in_cam.x(), point_in_cam.y(), depth);
-    const double extent = std::max(member.body.radius, 0.5 * member.body.height);
-    const double size = half_size / extent;
+    const double side = random_.Chance(0.5) ? 1.0 : -1.0;
+    const double along = random_.Uniform(-0.6, 0.6);
+    const Vector2d border = random_.Chance(0.3) ? Vector2d(along, 1.0) : Vector2d(side, along);
+    const Vector2d ray = border.cwiseProduct(half_view);
+    const Vector3d middle = Inverse(view.cam_from_world) * (depth * ray.homogeneous());
+    const double size = half_size / std::max(member.body.radius, 0.5 * member.body.height);
     const Vector3d foot = middle - 0.5 * size * member.body.height * Vector3d::UnitZ();
     return PlaceBody(member.body, {foot, DrawYaw(), size});
   }
@@ -211,9 +214,17 @@ class Director {
   std::vector<double> median_depths_;
 };
 
+void Append(const ActorsByView& more, ActorsByView& actors) {
+  for (size_t i = 0; i < actors.size(); ++i) {
+    auto& [pieces, footprints] = actors[i];
+    pieces.insert(pieces.end(), more[i].pieces.begin(), more[i].pieces.end());
+    footprints.insert(footprints.end(), more[i].footprints.begin(), more[i].footprints.end());
+  }
+}
+
 }  // namespace
 
-std::optional<PiecesByView> DrawDistractors(const Stage& stage,
+std::optional<ActorsByView> DrawDistractors(const Stage& stage,
                                             const std::vector<StreamView>& views,
                                             const std::vector<CastMember>& cast,
                                             uint32_t kinds,
@@ -232,16 +243,12 @@ std::optional<PiecesByView> DrawDistractors(const Stage& stage,
   const double wanted = random.Uniform(0.04, 0.26);
   CoverMeter meter(views);
   Director director(stage, views, random);
-  PiecesByView distractors(views.size());
+  ActorsByView distractors(views.size());
   for (int i = 0; i < kMaxTries && meter.cover() < wanted; ++i) {
     const CastMember& member = cast[random.Index(cast.size())];
     const DistractorKind way = ways[random.Index(ways.size())];
-    const PiecesByView pieces = director.Direct(member, way);
-    if (!meter.Add(pieces, kMaxDistractorCover / kMargin)) continue;
-    for (size_t view_idx = 0; view_idx < views.size(); ++view_idx) {
-      distractors[view_idx].insert(
-          distractors[view_idx].end(), pieces[view_idx].begin(), pieces[view_idx].end());
-    }
+    const ActorsByView actors = director.Direct(member, way);
+    if (meter.Add(actors, kMaxDistractorCover / kMargin)) Append(actors, distractors);
   }
   if (meter.cover() < kMargin * kMinDistractorCover) return std::nullopt;
   return distractors;

@@ -157,12 +157,6 @@ void SolidInView::BoundPixels(const Solid& solid,
   end_y_ = end.y();
 }
 
-SolidInView::Vector SolidInView::DirectionAt(float x, float y) const {
-  Vector direction;
-  for (size_t i = 0; i < 3; ++i) direction[i] = direction_[i] + y * per_y_[i] + x * per_x_[i];
-  return direction;
-}
-
 float SolidInView::DepthAt(float x, float y) const {
   const Vector direction = DirectionAt(x, y);
   return WithKind(kind_, [&]<ShapeKind kind>() { return Depth<kind>(origin_, direction); });

@@ -54,7 +54,11 @@ class SolidInView {
   template <ShapeKind kind>
   void CastRows(int32_t index, Grid<float>& depth, Grid<int32_t>& indices) const;
   void BoundPixels(const Solid& solid, const Camera& camera, const Rigid3d& cam_from_world);
-  Vector DirectionAt(float x, float y) const;
+  Vector DirectionAt(float x, float y) const {
+    Vector direction;
+    for (size_t i = 0; i < 3; ++i) direction[i] = direction_[i] + y * per_y_[i] + x * per_x_[i];
+    return direction;
+  }
 
   ShapeKind kind_;
   // In the frame of the unit solid: the camera's centre and directions of camera z 1.

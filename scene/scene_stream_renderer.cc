@@ -16,9 +16,64 @@ Vector3f Light(const Lighting& lighting, const Vector3f& normal) {
          std::max(0.0f, normal.dot(lighting.fill.direction)) * lighting.fill.colour;
 }
 
+// How much of the ambient light what stands on the floor takes from the floor around its foot.
+class ContactShadows {
+ public:
+  ContactShadows(const StreamWorld& world, size_t view_idx)
+      : floor_height_(static_cast<float>(world.stage.floor_height)) {
+    for (const Footprint& footprint : world.stage.footprints) Add(footprint);
+    for (const Footprint& footprint : world.distractors[view_idx].footprints) Add(footprint);
+  }
+
+  // Factor of the light at a point of a horizontal surface.
+  float LightAt(const Vector3f& point_in_world) const {
+    constexpr float kThickness = 0.02f;  // carpets, pavements
+    constexpr float kDarkness = 0.5f;
+    if (std::abs(point_in_world.z() - floor_height_) > kThickness) return 1.0f;
+    float light = 1.0f;
+    for (const Disc& disc : discs_) {
+      const float dx = point_in_world.x() - disc.x;
+      const float dy = point_in_world.y() - disc.y;
+      const float inside = 1.0f - (dx * dx + dy * dy) * disc.inverse_square;
+      if (inside > 0.0f) light *= 1.0f - kDarkness * inside * inside;
+    }
+    return light;
+  }
+
+ private:
+  struct Disc {
+    float x, y, inverse_square;
+  };
+
+  void Add(const Footprint& footprint) {
+    constexpr double kReach = 1.3;
+    const double radius = kReach * footprint.radius;
+    discs_.push_back({static_cast<float>(footprint.centre.x()),
+                      static_cast<float>(footprint.centre.y()),
+                      static_cast<float>(1.0 / (radius * radius))});
+  }
+
+  float floor_height_;
+  std::vector<Disc> discs_;
+};
+
 class Painter {
  public:
-  Painter(const StreamWorld& world, const SeenView& seen) : world_(world), seen_(seen) {}
+  Painter(const StreamWorld& world, const SeenView& seen)
+      : world_(world), seen_(seen), shadows_(world, seen.view_idx) {
+    const StreamView& view = world.views[seen.view_idx];
+    const Eigen::Matrix3d world_from_cam =
+        view.cam_from_world.rotation.conjugate().toRotationMatrix();
+    const double focal_length = view.camera.MeanFocalLength();
+    const Eigen::Vector2d principal_point = view.camera.PrincipalPoint();
+    origin_ = OriginInSource(view.cam_from_world).cast<float>();
+    per_x_ = (world_from_cam.col(0) / focal_length).cast<float>();
+    per_y_ = (world_from_cam.col(1) / focal_length).cast<float>();
+    at_zero_ =
+        (world_from_cam *
+         Eigen::Vector3d(-principal_point.x(), -principal_point.y(), focal_length) / focal_length)
+            .cast<float>();
+  }
 
   Vector3f PixelColour(int x, int y) const {
     const int32_t piece = seen_.hits.index(x, y);
@@ -43,7 +98,12 @@ class Painter {
     const Surface& surface = world_.stage.surfaces[static_cast<size_t>(seen_.surfaces[piece_idx])];
     const Vector3f colour = SurfaceColour(surface, sample);
     if (surface.pattern == Pattern::kSky) return colour;
-    return colour.cwiseProduct(Light(world_.lighting, sample.normal_in_world));
+    Vector3f light = Light(world_.lighting, sample.normal_in_world);
+    constexpr float kHorizontal = 0.99f;
+    if (sample.normal_in_world.z() > kHorizontal) {
+      light *= shadows_.LightAt(origin_ + depth * (at_zero_ + x * per_x_ + y * per_y_));
+    }
+    return colour.cwiseProduct(light);
   }
 
   // The pieces seen at the pixel and its eight neighbours, none twice.
@@ -103,6 +163,12 @@ class Painter {
 
   const StreamWorld& world_;
   const SeenView& seen_;
+  ContactShadows shadows_;
+  // Rays in the world: origin_ + depth * (at_zero_ + x * per_x_ + y * per_y_).
+  Vector3f origin_;
+  Vector3f at_zero_;
+  Vector3f per_x_;
+  Vector3f per_y_;
 };
 
 // [1 2 1] / 4 along rows and columns, mixed with the sharp picture.
@@ -124,6 +190,12 @@ void Blur(Grid<Vector3f>& picture, float strength) {
   }
 }
 
+float MeanBrightness(const Grid<Vector3f>& picture) {
+  Vector3f sum = Vector3f::Zero();
+  for (const Vector3f& colour : picture.data()) sum += colour.cwiseMin(1.0f);
+  return sum.mean() / static_cast<float>(picture.size());
+}
+
 // Sums of four uniform 16-bit numbers: sigma 1, close to normal, and cheap.
 Vector3f DrawNoise(RandomStream& random) {
   const auto draw = [&random] {
@@ -143,10 +215,11 @@ Vector3f DrawNoise(RandomStream& random) {
 
 SeenView SeeView(const StreamWorld& world, size_t view_idx) {
   const StreamView& view = world.views[view_idx];
-  const std::vector<Piece>& distractors = world.distractors[view_idx];
+  const std::vector<Piece>& distractors = world.distractors[view_idx].pieces;
   const auto width = static_cast<int>(view.camera.width);
   const auto height = static_cast<int>(view.camera.height);
-  SeenView seen{SeePieces(world.stage.pieces, view.camera, view.cam_from_world),
+  SeenView seen{view_idx,
+                SeePieces(world.stage.pieces, view.camera, view.cam_from_world),
                 {},
                 world.stage.pieces.size(),
                 HitMap(width, height),
@@ -171,7 +244,10 @@ Grid<Eigen::Vector3f> PaintView(const StreamWorld& world, const SeenView& seen) 
 }
 
 RgbImage Photograph(const Grid<Vector3f>& picture, RandomStream& random) {
-  const double log_gain = 0.15 * random.Normal();
+  // Automatic exposure brings the mean near a middle grey, but not all the way.
+  constexpr float kMiddleGrey = 0.45f;
+  const double log_gain = 0.7 * std::log(kMiddleGrey / std::max(MeanBrightness(picture), 0.02f)) +
+                          0.12 * random.Normal();
   const Eigen::Vector3d white_balance = 0.03 * random.NormalVector();
   const Vector3f gain =
       (255.0 * std::exp(log_gain) * (Eigen::Vector3d::Ones() + white_balance)).cast<float>();
@@ -179,7 +255,7 @@ RgbImage Photograph(const Grid<Vector3f>& picture, RandomStream& random) {
   const auto noise = static_cast<float>(random.Uniform(0.0, 5.0));
   const auto blur = static_cast<float>(random.Uniform(0.0, 0.8));
   Grid<Vector3f> exposed = picture;
-  if (random.Chance(0.5)) Blur(exposed, blur);
+  if (random.Chance(0.4)) Blur(exposed, blur);
   const float centre_x = 0.5f * static_cast<float>(picture.width());
   const float centre_y = 0.5f * static_cast<float>(picture.height());
   const float inverse = 1.0f / (centre_x * centre_x + centre_y * centre_y);

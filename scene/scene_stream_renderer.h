@@ -11,6 +11,7 @@ namespace vgtw {
 
 // Everything that a view's rays meet: the pieces of the static scene, then those of distractors.
 struct SeenView {
+  size_t view_idx = 0;
   std::vector<SolidInView> solids;
   std::vector<int> surfaces;  // of the solids
   size_t num_static = 0;

@@ -21,6 +21,12 @@ struct CastMember {
   double size = 1.0;
 };
 
+// A disc on the floor.
+struct Footprint {
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  double radius = 0.0;
+};
+
 // The static scene and where cameras and distractors may be in it; z up, scene units.
 struct Stage {
   Layout layout = Layout::kRoom;
@@ -30,11 +36,7 @@ struct Stage {
   // Bodies stand on this rectangle.
   Eigen::AlignedBox2d floor;
   double floor_height = 0.0;
-  struct Footprint {
-    Eigen::Vector2d centre;
-    double radius;
-  };
-  std::vector<Footprint> footprints;
+  std::vector<Footprint> footprints;  // of what stands there
 
   // Cameras look at the target from `distance`, seen under these angles, and stay in `space`.
   Eigen::Vector3d target = Eigen::Vector3d::Zero();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene/scene_stream_surface.h"
 
+#include "scene/scene_stream_noise.h"
+
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
@@ -113,10 +115,12 @@ Eigen::Vector3f Windows(const Surface& surface,
   return Mix(framed, reflection, pane(frame) * (1.0f - bar));
 }
 
+// Stretched along v where `stretch` > 1.
 Eigen::Vector3f Noise(const FacePlace& place, float scale, float stretch) {
-  const float noise = FractalNoise({place.u / scale, place.v / (scale * stretch)},
-                                   place.footprint / (scale * std::sqrt(stretch)),
-                                   place.seed);
+  const float noise = TableNoise(place.u / scale,
+                                 place.v / (scale * stretch),
+                                 place.footprint / (scale * std::sqrt(stretch)),
+                                 place.seed);
   return Mix(place.colours.dark, place.colours.light, std::clamp(0.5f + noise, 0.0f, 1.0f));
 }
 
@@ -302,8 +306,7 @@ Surface MakeSurface(SurfaceUse use,
   surface.pattern = DrawPattern(use, !photos.empty(), random);
   const bool is_small = size < 2.0;
   const double base = is_small ? size * random.Uniform(0.12, 0.5) : random.Uniform(0.2, 0.7);
-  surface.period = Eigen::Vector2f(static_cast<float>(base),
-                                   static_cast<float>(base * random.Uniform(0.4, 0.9)));
+  surface.period = Eigen::Vector2d{base, base * random.Uniform(0.4, 0.9)}.cast<float>();
   surface.joint = static_cast<float>(random.Uniform(0.05, 0.15));
   surface.dirt = static_cast<float>(random.Uniform(0.0, 0.35));
   surface.dirt_size = static_cast<float>(is_small ? size : 2.5);
@@ -315,8 +318,8 @@ Surface MakeSurface(SurfaceUse use,
       surface.period.y() = static_cast<float>(size * random.Uniform(1.0, 2.5));
       break;
     case Pattern::kWindows:
-      surface.period = Eigen::Vector2f(static_cast<float>(random.Uniform(1.6, 3.2)),
-                                       static_cast<float>(random.Uniform(2.4, 3.6)));
+      surface.period =
+          Eigen::Vector2d{random.Uniform(1.6, 3.2), random.Uniform(2.4, 3.6)}.cast<float>();
       surface.joint = static_cast<float>(random.Uniform(0.15, 0.3));
       break;
     case Pattern::kNoise:
@@ -344,11 +347,11 @@ Eigen::Vector3f SurfaceColour(const Surface& surface, const SurfaceSample& sampl
   const FacePlace place = FindPlace(surface, sample);
   Eigen::Vector3f colour = PatternColour(surface, sample, place);
   if (surface.dirt > 0.0f) {
-    // Two or three octaves are enough to tell one brick from the next.
-    const double size = surface.dirt_size;
-    const double footprint = std::max(place.footprint / size, 0.15);
-    colour *= 1.0f +
-              surface.dirt * FractalNoise({place.u / size, place.v / size}, footprint, ~place.seed);
+    // Coarse noise is enough to tell one brick from the next.
+    const float size = surface.dirt_size;
+    const float footprint = std::max(place.footprint / size, 0.1f);
+    colour *=
+        1.0f + surface.dirt * TableNoise(place.u / size, place.v / size, footprint, ~place.seed);
   }
   return colour;
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene/scene_stream_world.h"
 
-#include "scene/scene_stream_distractors.h"
-
 #include <algorithm>
 #include <cmath>
 

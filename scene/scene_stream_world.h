@@ -3,6 +3,7 @@
 
 #include "scene/scene_stream.h"
 #include "scene/scene_stream_cameras.h"
+#include "scene/scene_stream_distractors.h"
 #include "scene/scene_stream_stage.h"
 
 #include <optional>
@@ -24,7 +25,7 @@ struct Lighting {
 struct StreamWorld {
   Stage stage;
   std::vector<StreamView> views;
-  std::vector<std::vector<Piece>> distractors;  // by view
+  std::vector<Actors> distractors;  // by view
   Lighting lighting;
 };
 
