@@ -45,7 +45,8 @@ std::optional<fs::path> Locate(const fs::path& input_path, const PhotoIndex&) {
 }
 
 size_t CountCameras(const fs::path& folder) {
-  const auto entries = fs::directory_iterator(folder);
+  std::error_code code;
+  const auto entries = fs::directory_iterator(folder, code);
   return static_cast<size_t>(std::count_if(
       begin(entries), end(entries), [](const auto& e) { return e.path().extension() == ".npz"; }));
 }

@@ -4,6 +4,7 @@
 #include "scene/error.h"
 #include "scene/files.h"
 #include "tests/bridge/numpy_files.h"
+#include "tests/bridge/sample_scene.h"
 #include "tests/support/temporary_folder.h"
 
 #include <cmath>
@@ -17,59 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using Arrays = std::map<std::string, std::string>;
 
-constexpr size_t kNumViews = 3;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
-Rigid3d WorldFromCam(size_t view) {
-  const auto i = static_cast<double>(view);
-  return {RotationAboutAxis(Eigen::Vector3d(0.2, 1, 0.1 * i).normalized(), 8.0 * i),
-          {0.7 * i, -0.2 * i, 0.3 - 0.1 * i}};
-}
-
-// What a network says of kNumViews photos of one size, as its demo's arrays. Values are those of a
-// scene of bumpy depth through the pinhole (fx, fy, W/2, H/2).
-struct Scene {
-  int width;
-  int height;
-  double fx;
-  double fy;
-  std::vector<float> poses = {};   // [S,4,4] world_from_cam
-  std::vector<float> depth = {};   // [S,H,W]
-  std::vector<float> points = {};  // [S,H,W,3] in the world
-
-  Scene(int map_width, int map_height, double focal_x, double focal_y, bool is_inverted = false)
-      : width(map_width), height(map_height), fx(focal_x), fy(focal_y) {
-    for (size_t i = 0; i < kNumViews; ++i) {
-      const Rigid3d world_from_cam = WorldFromCam(i);
-      const Rigid3d written = is_inverted ? Inverse(world_from_cam) : world_from_cam;
-      Eigen::Matrix<float, 4, 4, Eigen::RowMajor> matrix = decltype(matrix)::Identity();
-      matrix.topRows<3>() = written.ToMatrix().cast<float>();
-      poses.insert(poses.end(), matrix.data(), matrix.data() + 16);
-      for (int y = 0; y < height; ++y) {
-        for (int x = 0; x < width; ++x) AddPixel(world_from_cam, x, y);
-      }
-    }
-  }
-  void AddPixel(const Rigid3d& world_from_cam, int x, int y) {
-    const double z = 3.0 + 0.25 * ((2 * x + 3 * y) % 9);
-    depth.push_back(static_cast<float>(z));
-    const Eigen::Vector3f point =
-        (world_from_cam *
-         Eigen::Vector3d((x + 0.5 - 0.5 * width) / fx * z, (y + 0.5 - 0.5 * height) / fy * z, z))
-            .cast<float>();
-    points.insert(points.end(), point.data(), point.data() + 3);
-  }
-  size_t NumPixels() const { return depth.size() / kNumViews; }
-  // "(3, H, W" + rest
-  std::string Shape(const std::string& rest) const {
-    return "(3, " + std::to_string(height) + ", " + std::to_string(width) + rest;
-  }
-  std::string Poses() const { return NpyFloats("(3, 4, 4)", poses); }
-  std::string Points() const { return NpyFloats(Shape(", 3)"), points); }
-  std::string Map(float value) const {
-    return NpyFloats(Shape(")"), std::vector<float>(depth.size(), value));
-  }
-};
 
 struct Case {
   TemporaryFolder folder;
@@ -102,8 +51,8 @@ void ExpectHas(const std::string& message, const std::string& part) {
 }
 
 void ExpectTruePoses(const Prediction& prediction) {
-  ASSERT_EQ(prediction.views.size(), kNumViews);
-  for (size_t i = 0; i < kNumViews; ++i) {
+  ASSERT_EQ(prediction.views.size(), kNumSceneViews);
+  for (size_t i = 0; i < kNumSceneViews; ++i) {
     const Eigen::Matrix<double, 3, 4> truth = Inverse(WorldFromCam(i)).ToMatrix();
     // The files hold float: 6e-8 relative.
     EXPECT_LT((prediction.views[i].view.cam_from_world.ToMatrix() - truth).norm(), 1e-6) << i;
@@ -111,8 +60,8 @@ void ExpectTruePoses(const Prediction& prediction) {
 }
 
 // The depth that was derived from points, at every pixel.
-void ExpectTrueDepth(const Scene& scene, const Prediction& prediction) {
-  for (size_t i = 0; i < kNumViews; ++i) {
+void ExpectTrueDepth(const SampleScene& scene, const Prediction& prediction) {
+  for (size_t i = 0; i < kNumSceneViews; ++i) {
     const std::vector<float>& read = prediction.views[i].depth.data();
     ASSERT_EQ(read.size(), scene.NumPixels());
     for (size_t k = 0; k < read.size(); ++k) {
@@ -124,10 +73,10 @@ void ExpectTrueDepth(const Scene& scene, const Prediction& prediction) {
 // --- pi3 ------------------------------------------------------------------------------------
 
 // Photos of 112x80 become 56x42: stretched, by 2 and 80/42.
-Scene Pi3Scene(bool is_inverted = false) { return {56, 42, 50.0, 52.0, is_inverted}; }
+SampleScene Pi3Scene(bool is_inverted = false) { return {56, 42, 50.0, 52.0, is_inverted}; }
 
 // numpy.savez(**predictions) of demo_gradio.py: the confidence keeps its channel.
-Arrays Pi3Arrays(const Scene& scene) {
+Arrays Pi3Arrays(const SampleScene& scene) {
   return {{"points", scene.Points()},
           {"conf", NpyFloats(scene.Shape(", 1)"), std::vector<float>(scene.depth.size(), 0.75f))},
           {"camera_poses", scene.Poses()},
@@ -135,12 +84,12 @@ Arrays Pi3Arrays(const Scene& scene) {
 }
 
 struct Pi3Case : Case {
-  explicit Pi3Case(const Scene& scene) : Pi3Case(Pi3Arrays(scene)) {}
+  explicit Pi3Case(const SampleScene& scene) : Pi3Case(Pi3Arrays(scene)) {}
   explicit Pi3Case(const Arrays& arrays) : Case(112, 80, "predictions.npz", arrays) {}
 };
 
 TEST(ImportPi3, PosesDepthAndFittedCamerasAreTheTruth) {
-  const Scene scene = Pi3Scene();
+  const SampleScene scene = Pi3Scene();
   Pi3Case test(scene);
   const ImportSummary summary = test.Run();
   EXPECT_EQ(summary.format, ImportFormat::kPi3);
@@ -169,7 +118,7 @@ TEST(ImportPi3, PosesTheWrongWayRoundAreNamed) {
 }
 
 TEST(ImportPi3, OpenGlAxesAreNamed) {
-  Scene scene = Pi3Scene();
+  SampleScene scene = Pi3Scene();
   for (size_t i = 0; i < scene.poses.size(); ++i) {
     if (i % 16 < 12 && (i % 4 == 1 || i % 4 == 2)) scene.poses[i] = -scene.poses[i];
   }
@@ -187,7 +136,7 @@ TEST(ImportPi3, GivenCameraParametersAreTaken) {
 }
 
 TEST(ImportPi3, BadViewsAreLeftOut) {
-  Scene scene = Pi3Scene();
+  SampleScene scene = Pi3Scene();
   scene.poses[0] = kNan;
   const auto second = scene.points.begin() + static_cast<ptrdiff_t>(3 * scene.NumPixels());
   for (size_t k = 0; k < 3 * scene.NumPixels(); ++k) {
@@ -211,7 +160,7 @@ TEST(ImportPi3, OtherPhotosAreNamed) {
 }
 
 TEST(ImportPi3, WrongShapesAreNamed) {
-  const Scene scene = Pi3Scene();
+  const SampleScene scene = Pi3Scene();
   Arrays flat = Pi3Arrays(scene);
   flat["points"] = NpyFloats("(3, 2352, 3)", scene.points);
   ExpectHas(Pi3Case(flat).Message(), "points: has shape (3, 2352, 3), expected maps of 42 rows");
@@ -228,9 +177,9 @@ TEST(ImportPi3, WrongShapesAreNamed) {
 // --- Fast3R ---------------------------------------------------------------------------------
 
 // Photos of 64x48 through DUSt3R's loader at 32: resized to 32x24, rows 4 to 19 kept.
-Scene Dust3rScene(bool is_inverted = false) { return {32, 16, 30.5, 30.5, is_inverted}; }
+SampleScene Dust3rScene(bool is_inverted = false) { return {32, 16, 30.5, 30.5, is_inverted}; }
 
-Arrays Fast3rArrays(const Scene& scene) {
+Arrays Fast3rArrays(const SampleScene& scene) {
   std::vector<float> local = scene.points;
   for (float& value : local) value = 3.0f * value + 1.0f;
   return {{"global_pointmaps", NpyFloats(scene.Shape(", 3)"), local)},
@@ -248,7 +197,7 @@ struct Fast3rCase : Case {
 };
 
 TEST(ImportFast3r, AlignedPointsGiveDepthInTheScaleOfThePoses) {
-  const Scene scene = Dust3rScene();
+  const SampleScene scene = Dust3rScene();
   Fast3rCase test(Fast3rArrays(scene));
   const ImportSummary summary = test.Run();
   EXPECT_EQ(summary.format, ImportFormat::kFast3r);
@@ -271,7 +220,7 @@ TEST(ImportFast3r, ListsOfDifferentShapesAreNamed) {
 // --- DUSt3R and MASt3R ----------------------------------------------------------------------
 
 // numpy.savez(poses=scene.get_im_poses(), focals=scene.get_focals(), ...), stacked.
-Arrays Dust3rArrays(const Scene& scene) {
+Arrays Dust3rArrays(const SampleScene& scene) {
   return {{"poses", scene.Poses()},
           {"focals", NpyFloats("(3, 1)", {30.5f, 31.0f, 31.5f})},
           {"depthmaps", NpyFloats(scene.Shape(")"), scene.depth)},
@@ -286,7 +235,7 @@ struct Dust3rCase : Case {
 };
 
 TEST(ImportDust3r, SceneIsReadFromAnArchiveAndFromAFolder) {
-  const Scene scene = Dust3rScene();
+  const SampleScene scene = Dust3rScene();
   for (const bool is_folder : {false, true}) {
     Dust3rCase test(Dust3rArrays(scene));
     if (is_folder) {
@@ -315,7 +264,7 @@ TEST(ImportDust3r, PrincipalPointsAndMatricesAreTaken) {
   EXPECT_EQ(test.Read().views[1].view.camera.params, (std::vector<double>{62, 62, 34, 25}));
   Arrays matrices = Dust3rArrays(Dust3rScene());
   std::vector<float> k;
-  for (size_t i = 0; i < kNumViews; ++i) k.insert(k.end(), {20, 0, 16, 0, 22, 8, 0, 0, 1});
+  for (size_t i = 0; i < kNumSceneViews; ++i) k.insert(k.end(), {20, 0, 16, 0, 22, 8, 0, 0, 1});
   matrices["intrinsics"] = NpyFloats("(3, 3, 3)", k);
   Dust3rCase other(matrices);
   other.Run();
@@ -364,12 +313,12 @@ TEST(ImportDust3r, WrongShapesAreNamed) {
 // --- MapAnything ----------------------------------------------------------------------------
 
 // Photos of 64x48 cover 56x28 as 56x42; rows 7 to 34 are kept.
-Scene MapAnythingScene() { return {56, 28, 49.0, 49.0}; }
+SampleScene MapAnythingScene() { return {56, 28, 49.0, 49.0}; }
 
 // predictions.npz of scripts/gradio_app.py: VGGT's words, but extrinsic is world_from_cam.
-Arrays MapAnythingArrays(const Scene& scene) {
+Arrays MapAnythingArrays(const SampleScene& scene) {
   std::vector<float> k;
-  for (size_t i = 0; i < kNumViews; ++i) k.insert(k.end(), {49, 0, 28, 0, 49, 14, 0, 0, 1});
+  for (size_t i = 0; i < kNumSceneViews; ++i) k.insert(k.end(), {49, 0, 28, 0, 49, 14, 0, 0, 1});
   std::string is_valid(scene.depth.size(), '\1');
   is_valid[5] = '\0';
   return {{"extrinsic", scene.Poses()},
@@ -381,7 +330,7 @@ Arrays MapAnythingArrays(const Scene& scene) {
 }
 
 TEST(ImportMapAnything, PosesAreWorldFromCamAndCropsAreUndone) {
-  const Scene scene = MapAnythingScene();
+  const SampleScene scene = MapAnythingScene();
   Case test(64, 48, "predictions.npz", MapAnythingArrays(scene));
   const ImportSummary summary = test.Run();
   EXPECT_EQ(summary.format, ImportFormat::kMapAnything);

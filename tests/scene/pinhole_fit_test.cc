@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene/pinhole_fit.h"
 
+#include "scene/safetensors.h"
 #include "scene/statistics.h"
+#include "tests/support/shared_data.h"
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -39,6 +42,31 @@ TEST(FitPinhole, IsExactForExactPoints) {
   ConfidenceMap weights(20, 14);
   for (size_t i = 0; i < weights.size(); ++i) weights.data()[i] = 0.1f + static_cast<float>(i % 5);
   ExpectTruth(FitPinhole(ExactPoints(), weights));
+}
+
+std::vector<float> Floats(const SafetensorsFile& file, const std::string& name) {
+  const StoredTensor& tensor = file.tensors().at(name);
+  std::vector<float> values(tensor.NumElements());
+  std::memcpy(values.data(), tensor.bytes.data(), tensor.bytes.size());
+  return values;
+}
+
+// pi3's own recovery of intrinsics from noisy rays, whose first pixel lies at (0, 0).
+TEST(FitPinhole, EqualsTheOfficialFit) {
+  VGTW_NEED_PARITY_DATA();
+  const SafetensorsFile file(ParityData() / "ops.safetensors");
+  const std::vector<float> rays = Floats(file, "pi3.rays");
+  const std::vector<float> official = Floats(file, "pi3.K");
+  Grid<Eigen::Vector3f> points(20, 14);
+  ASSERT_EQ(rays.size(), 3 * points.size());
+  std::memcpy(points.data().front().data(), rays.data(), rays.size() * sizeof(float));
+  const auto fit = FitPinhole(points, {});
+  ASSERT_TRUE(fit);
+  // The official one is in float: 1e-5 relative for sums of 280 terms.
+  EXPECT_NEAR(fit->intrinsics(0, 0) / official[0], 1.0, 1e-5);
+  EXPECT_NEAR(fit->intrinsics(1, 1) / official[4], 1.0, 1e-5);
+  EXPECT_NEAR(fit->intrinsics(0, 2), official[2] + 0.5, 1e-4);
+  EXPECT_NEAR(fit->intrinsics(1, 2), official[5] + 0.5, 1e-4);
 }
 
 TEST(FitPinhole, PointsThatDoNotCountHaveNoInfluence) {
