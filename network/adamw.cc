@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "network/adamw.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -14,10 +15,13 @@ constexpr double kLowestRate = 1e-8;
 }  // namespace
 
 double LearningRateSchedule::At(int64_t step) const {
-  const double num_warmup = warmup_share * static_cast<double>(num_steps);
+  const auto num = static_cast<double>(num_steps);
   const auto done = static_cast<double>(step);
+  const double num_warmup = warmup_share * num;
   if (done < num_warmup) return kLowestRate + (peak - kLowestRate) * done / num_warmup;
-  const double share = (done - num_warmup) / (static_cast<double>(num_steps) - num_warmup);
+  const double num_decay = decay_share * num;
+  if (num_decay <= 0.0) return peak;
+  const double share = std::max(0.0, 1.0 - (num - done) / num_decay);
   return kLowestRate + 0.5 * (peak - kLowestRate) * (1.0 + std::cos(std::numbers::pi * share));
 }
 
@@ -70,7 +74,9 @@ AdamW::GroupNorms AdamW::Step(std::vector<at::Tensor> gradients,
     const at::Tensor root = (second / correction2).sqrt_().add_(options_.epsilon);
     parameter.value.addcdiv_(first, root, -learning_rate / correction1);
     if (moments_.mean.empty()) continue;
-    moments_.mean[i].lerp_(parameter.value, 1.0 - options_.ema_decay);
+    // At first of few steps, or the fresh values would last long.
+    const double decay = std::min(options_.ema_decay, power / (power + 9.0));
+    moments_.mean[i].lerp_(parameter.value, 1.0 - decay);
   }
   return norms;
 }

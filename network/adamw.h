@@ -12,10 +12,12 @@
 
 namespace vgtw {
 
-// Linear from 1e-8 to the peak over the first share of the steps, then a half cosine down to 1e-8.
+// Linear from 1e-8 to the peak over the first share of the steps, a half cosine down to 1e-8 over
+// the last share, the peak in between.
 struct LearningRateSchedule {
   double peak = 1e-4;
   double warmup_share = 0.05;
+  double decay_share = 0.95;
   int64_t num_steps = 1;
 
   double At(int64_t step) const;  // step in [0, num_steps)

@@ -16,30 +16,6 @@ PixelGrid IntegerGrid(int64_t height, int64_t width, const at::TensorOptions& op
   return {at::arange(width, options).unsqueeze(0), at::arange(height, options).unsqueeze(1)};
 }
 
-// (slope, offset) of target = slope * x + offset; the offset may be given.
-struct LineFit {
-  at::Tensor slope;
-  at::Tensor offset;
-};
-
-LineFit FitLine(const at::Tensor& x, const at::Tensor& target, const at::Tensor& weights) {
-  const at::Tensor total = weights.sum();
-  const at::Tensor mean_x = (weights * x).sum() / total;
-  const at::Tensor mean_target = (weights * target).sum() / total;
-  const at::Tensor centred = x - mean_x;
-  const at::Tensor slope =
-      (weights * centred * (target - mean_target)).sum() / (weights * centred * centred).sum();
-  return {slope, mean_target - slope * mean_x};
-}
-
-LineFit FitSlope(const at::Tensor& x,
-                 const at::Tensor& target,
-                 const at::Tensor& weights,
-                 double offset) {
-  const at::Tensor slope = (weights * x * (target - offset)).sum() / (weights * x * x).sum();
-  return {slope, at::full_like(slope, offset)};
-}
-
 }  // namespace
 
 at::Tensor RotationsFromQuaternions(const at::Tensor& quaternions_xyzw) {
@@ -139,36 +115,6 @@ at::Tensor Unproject(const at::Tensor& depth, const CameraMatrices& cameras) {
   // R^T (x - t) for rows of points.
   const at::Tensor points = in_cam.flatten(1, 2) - translations;
   return at::bmm(points, rotations).view(in_cam.sizes());
-}
-
-at::Tensor FitIntrinsics(const at::Tensor& local_points,
-                         bool is_centred,
-                         const at::Tensor& weights) {
-  const at::Tensor points = local_points.to(at::kDouble);
-  const int64_t height = points.size(0);
-  const int64_t width = points.size(1);
-  const at::Tensor z = points.select(2, 2);
-  const at::Tensor x = points.select(2, 0) / z;
-  const at::Tensor y = points.select(2, 1) / z;
-  const PixelGrid grid = IntegerGrid(height, width, points.options());
-  const at::Tensor w = weights.defined() ? weights.to(at::kDouble) : at::ones_like(z);
-  const at::Tensor u = grid.u.expand({height, width});
-  const at::Tensor v = grid.v.expand({height, width});
-  const double middle_u = 0.5 * static_cast<double>(width - 1);
-  const double middle_v = 0.5 * static_cast<double>(height - 1);
-  const LineFit fit_u = is_centred ? FitSlope(x, u, w, middle_u) : FitLine(x, u, w);
-  const LineFit fit_v = is_centred ? FitSlope(y, v, w, middle_v) : FitLine(y, v, w);
-  const at::Tensor zero = at::zeros_like(fit_u.slope);
-  return at::stack({fit_u.slope,
-                    zero,
-                    fit_u.offset,
-                    zero,
-                    fit_v.slope,
-                    fit_v.offset,
-                    zero,
-                    zero,
-                    at::ones_like(zero)})
-      .view({3, 3});
 }
 
 }  // namespace vgtw

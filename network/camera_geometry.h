@@ -38,12 +38,4 @@ at::Tensor NearestRotations(const at::Tensor& raw);
 // Points [S, H, W, 3] in the frame of the world from z-depths [S, H, W].
 at::Tensor Unproject(const at::Tensor& depth, const CameraMatrices& cameras);
 
-// Focal lengths and centre (3 x 3) that best explain where the rays of points [H, W, 3] in the
-// frame of the camera meet the image: least squares over u = fx x/z + cx and v alike. With
-// `is_centred` the centre is the middle of the pixel grid, ((W - 1)/2, (H - 1)/2). `weights` [H, W]
-// or undefined.
-at::Tensor FitIntrinsics(const at::Tensor& local_points,
-                         bool is_centred,
-                         const at::Tensor& weights = {});
-
 }  // namespace vgtw

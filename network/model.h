@@ -38,7 +38,7 @@ struct EncodeOptions {
 struct CameraOutputs {
   at::Tensor pose_encodings = {};  // VGGT: [4, S, 9], the four steps of the camera head
   at::Tensor cam_from_world = {};  // [S, 3, 4]
-  at::Tensor intrinsics = {};      // [S, 3, 3], pixels; undefined for pi3, see FitIntrinsics
+  at::Tensor intrinsics = {};      // [S, 3, 3], pixels; undefined for pi3, see scene/pinhole_fit.h
 };
 
 // Of n = end - begin views; undefined what a network does not predict.
@@ -54,6 +54,8 @@ struct DenseOutputs {
 struct MapChoice {
   // VGGT's and VGTW's points have a head of their own, as costly as depth; pi3's come with depth.
   bool points = true;
+  bool depth = true;       // with its confidence
+  bool distractor = true;  // where the network has such a head
 };
 
 class Model {

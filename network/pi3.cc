@@ -158,7 +158,7 @@ CameraOutputs Pi3::PredictCameras(const Features& features) const {
 DenseOutputs Pi3::PredictMaps(const Features& features,
                               int64_t begin,
                               int64_t end,
-                              const MapChoice&) const {
+                              const MapChoice& choice) const {
   const at::Tensor tokens = features.last.slice(0, begin, end);
   const RotaryTable rotary = RotaryOf(features, config_.head_dim / config_.num_head_heads);
   const auto to_pixels = [&](const Pi3Decoder& decoder, const Linear& head) {
@@ -166,12 +166,14 @@ DenseOutputs Pi3::PredictMaps(const Features& features,
     return PatchesToPixels(patches, features.height, features.width);
   };
   DenseOutputs outputs;
-  const at::Tensor raw = to_pixels(point_decoder_, point_head_);  // slopes of the ray, log depth
-  outputs.depth = raw.select(1, 2).exp();
-  outputs.local_points = at::stack(
-      {raw.select(1, 0) * outputs.depth, raw.select(1, 1) * outputs.depth, outputs.depth}, 3);
-  outputs.depth_conf = to_pixels(conf_decoder_, conf_head_).select(1, 0);
-  if (distractor_head_) {
+  if (choice.depth) {
+    const at::Tensor raw = to_pixels(point_decoder_, point_head_);  // slopes of the ray, log depth
+    outputs.depth = raw.select(1, 2).exp();
+    outputs.local_points = at::stack(
+        {raw.select(1, 0) * outputs.depth, raw.select(1, 1) * outputs.depth, outputs.depth}, 3);
+    outputs.depth_conf = to_pixels(conf_decoder_, conf_head_).select(1, 0);
+  }
+  if (distractor_head_ && choice.distractor) {
     outputs.distractor_logits =
         (*distractor_head_)(SliceViews(features, begin, end), features.height, features.width)
             .select(1, 0);

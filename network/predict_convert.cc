@@ -3,6 +3,7 @@
 
 #include "network/camera_geometry.h"
 #include "scene/network_pixels.h"
+#include "scene/pinhole_fit.h"
 
 #include <algorithm>
 #include <cmath>
@@ -49,17 +50,18 @@ at::Tensor PhotoPixels(const PhotoPlacement& placement, const at::Tensor& like) 
   return on_photo;
 }
 
-// pi3's intrinsics in continuous network pixels.
-at::Tensor FitContinuousIntrinsics(const PhotoPlacement& placement, const DenseOutputs& maps) {
+// pi3's intrinsics in continuous network pixels; nullopt if its points fit no camera.
+std::optional<Eigen::Matrix3d> FitIntrinsics(const PhotoPlacement& placement,
+                                             const DenseOutputs& maps) {
   constexpr int64_t kMinStaticPixels = 1000;
   at::Tensor weights = PhotoPixels(placement, maps.depth_conf) * maps.depth_conf.sigmoid();
   if (maps.distractor_logits.defined()) {
     const at::Tensor is_static = maps.distractor_logits <= 0.0;
     if (is_static.sum().item<int64_t>() >= kMinStaticPixels) weights = weights * is_static;
   }
-  at::Tensor intrinsics = FitIntrinsics(maps.local_points, /*is_centred=*/false, weights);
-  intrinsics.slice(0, 0, 2).select(1, 2).add_(0.5);
-  return intrinsics;
+  const std::optional<PinholeFit> fit = FitPinhole(ToPointGrid(maps.local_points), ToGrid(weights));
+  if (!fit) return std::nullopt;
+  return fit->intrinsics;
 }
 
 at::Tensor WorldPoints(const RawView& raw) {
@@ -82,12 +84,13 @@ bool HasUsableFieldOfView(const Eigen::Matrix3d& intrinsics, const NetworkGeomet
 
 // Sets the camera and the pose; returns why they cannot be used, or "".
 std::string SetCamera(const PhotoPlacement& placement, const RawView& raw, View& view) {
-  const at::Tensor intrinsics =
-      raw.intrinsics.defined() ? raw.intrinsics : FitContinuousIntrinsics(placement, raw.maps);
-  const auto k = ToMatrix<3, 3>(intrinsics);
+  const std::optional<Eigen::Matrix3d> k = raw.intrinsics.defined()
+                                               ? ToMatrix<3, 3>(raw.intrinsics)
+                                               : FitIntrinsics(placement, raw.maps);
+  if (!k) return "its points fit no pinhole camera";
   const std::optional<Camera> camera =
-      CameraFromNetwork(k, placement.geometry, placement.photo_size);
-  if (!camera || !HasUsableFieldOfView(k, placement.geometry)) {
+      CameraFromNetwork(*k, placement.geometry, placement.photo_size);
+  if (!camera || !HasUsableFieldOfView(*k, placement.geometry)) {
     return "its field of view is near 0 or 180 degrees";
   }
   view.camera = *camera;

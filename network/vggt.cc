@@ -77,15 +77,18 @@ DenseOutputs Vggt::PredictMaps(const Features& features,
     return head(layers, features.height, features.width);
   };
   DenseOutputs outputs;
-  const at::Tensor depth = run(depth_head_);
-  outputs.depth = depth.select(1, 0).exp();
-  outputs.depth_conf = 1.0 + depth.select(1, 1).exp();
+  if (choice.depth) {
+    const at::Tensor depth = run(depth_head_);
+    outputs.depth = depth.select(1, 0).exp();
+    outputs.depth_conf = 1.0 + depth.select(1, 1).exp();
+  }
   if (choice.points && point_head_) {
     const at::Tensor points = run(*point_head_);
     outputs.points = InverseLog(points.slice(1, 0, 3)).permute({0, 2, 3, 1});
     outputs.points_conf = 1.0 + points.select(1, 3).exp();
   }
-  if (distractor_head_) outputs.distractor_logits = run(*distractor_head_).select(1, 0);
+  if (distractor_head_ && choice.distractor)
+    outputs.distractor_logits = run(*distractor_head_).select(1, 0);
   return outputs;
 }
 

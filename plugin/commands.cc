@@ -116,6 +116,7 @@ const std::vector<Command>& Commands() {
        "transforms.json\n"
        "  vgtw export --input_path predictions/ --format tum --label name --output_path poses.txt"},
       {"probe", kProbeSummary, {}, {}, BecomeNetworkProgram},
+      {"train", kTrainSummary, {}, {}, BecomeNetworkProgram},
       {"weights", kWeightsSummary},
       {"weights inspect", kWeightsInspectSummary, {}, {}, BecomeNetworkProgram},
       {"weights check", kWeightsCheckSummary, {}, {}, BecomeNetworkProgram},

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/flags.h"
 
+#include "plugin/config_file.h"
 #include "plugin/version.h"
 #include "scene/error.h"
 
@@ -17,6 +18,7 @@ namespace vgtw {
 struct Flags::Impl {
   CLI::App* app = nullptr;
   std::string group = "Options";
+  bool has_config = false;
 };
 
 namespace {
@@ -115,7 +117,9 @@ class Program {
 
   int Run(int argc, char** argv) {
     try {
-      app_.parse(argc, argv);
+      std::vector<std::string> arguments = WithConfig({argv + 1, argv + argc});
+      std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
+      app_.parse(std::move(arguments));
     } catch (const CLI::CallForHelp&) {
       std::fputs(Innermost(&app_)->help().c_str(), stdout);
       return 0;
@@ -124,6 +128,8 @@ class Program {
       return 0;
     } catch (const CLI::ParseError& error) {
       return ReportUsage(app_, error);
+    } catch (const Error& error) {
+      return Fail(app_, error.what());
     }
     // Asked for here and not by CLI11, which would not tell a misspelt command from none.
     const auto work = works_.find(Innermost(&app_));
@@ -145,6 +151,18 @@ class Program {
   }
 
  private:
+  // The words of a command line, followed by the flags of the file that --config names.
+  std::vector<std::string> WithConfig(std::vector<std::string> arguments) const {
+    const auto is_called = [&](const std::unique_ptr<Flags::Impl>& impl) {
+      return impl->has_config && !arguments.empty() && impl->app->get_name() == arguments.front();
+    };
+    const std::filesystem::path config = FindConfig(arguments);
+    if (config.empty() || std::none_of(impls_.begin(), impls_.end(), is_called)) return arguments;
+    const std::vector<std::string> flags = FlagsOfConfig(config, arguments);
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    return arguments;
+  }
+
   CLI::App& Group(const std::string& name, std::string_view summary) {
     CLI::App*& group = groups_[name];
     if (group == nullptr) {
@@ -259,6 +277,11 @@ Flags& Flags::Positional(std::string_view name,
       ->expected(min_num, std::numeric_limits<int>::max())
       ->required();
   return *this;
+}
+
+Flags& Flags::ConfigFile(std::filesystem::path* value) {
+  impl_->has_config = true;
+  return Add("config", value, "File of flags, a line 'name = value' each; those given here win");
 }
 
 Flags& Flags::Require(std::string_view name, std::filesystem::path* value, std::string_view help) {

@@ -36,6 +36,8 @@ class Flags {
                     std::vector<std::filesystem::path>* values,
                     int min_num,
                     std::string_view help);
+  // --config: a file with a line `name = value` per flag. The command line wins.
+  Flags& ConfigFile(std::filesystem::path* value);
   // A path that must be given.
   Flags& Require(std::string_view name, std::filesystem::path* value, std::string_view help);
 

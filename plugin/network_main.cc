@@ -65,6 +65,12 @@ std::vector<Command> NetworkCommands() {
        DeclareProbe,
        "  vgtw probe --image_path photos/ --weights_path vgtw.safetensors --mask_path masks/ "
        "--query_image a.jpg --query_x 640 --query_y 360 --output_path probe/"},
+      {"train",
+       kTrainSummary,
+       DeclareTrain,
+       "  vgtw train --weights_path vggt.safetensors --image_path scenes/ --mask_path masks/ "
+       "--scene_share 0 --output_path run/\n"
+       "  vgtw train --config examples/train_tiny.conf --output_path run/"},
       {"weights", kWeightsSummary},
       {"weights inspect",
        kWeightsInspectSummary,

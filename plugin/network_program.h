@@ -12,6 +12,8 @@ namespace vgtw {
 inline constexpr std::string_view kPredictSummary = "Photos and weights -> predictions folder";
 inline constexpr std::string_view kProbeSummary =
     "Pictures of what a patch attends to and of what resembles it";
+inline constexpr std::string_view kTrainSummary =
+    "Distractor-aware training, and training of small networks from nothing";
 inline constexpr std::string_view kWeightsSummary =
     "Look at, check and convert a network's weights";
 inline constexpr std::string_view kWeightsInspectSummary = "What a file of weights holds";

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Distractor-aware training (Pan et al., Visual Geometry Transformer in the Wild, section 4) and
+// training of small networks from nothing.
+#pragma once
+
+#include "network/config.h"
+#include "scene/progress.h"
+#include "scene/scene_stream.h"
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace vgtw {
+
+// What is added up, each with its weight.
+enum class TrainingLoss { kMask, kSuppression, kConsistency, kCamera, kDepth };
+inline constexpr size_t kNumTrainingLosses = 5;
+inline constexpr std::array<const char*, kNumTrainingLosses> kTrainingLossNames = {
+    "mask", "suppression", "consistency", "camera", "depth"};
+
+// Photos with masks of their distractors (scene/distractor_mask.h: <name>.png, 0 = excluded).
+struct MaskedFolder {
+  std::filesystem::path image_path;
+  std::filesystem::path mask_path;
+};
+
+struct TrainOptions {
+  // Weights to start from, later ones over earlier ones; none = a new network of `sizes`.
+  std::vector<std::filesystem::path> weights;
+  VggtConfig sizes = {};
+  uint64_t weights_seed = 0;  // of what is new
+  // True: LoRA and distractor head alone, on weights that stay; they are added where the weights
+  // have none. False: everything.
+  bool lora_only = true;
+  LoraConfig lora = {};
+  double lora_dropout = 0.05;
+
+  // In the order of TrainingLoss; the defaults are the paper's, which has no labels of geometry.
+  std::array<double, kNumTrainingLosses> loss_weights = {0.2, 0.01, 0.05, 0.0, 0.0};
+
+  // What is learnt from: rendered scenes without end, and folders, by their shares.
+  SceneStreamOptions scenes = {};
+  double scene_share = 1.0;
+  std::vector<MaskedFolder> folders;
+
+  int64_t num_steps = 1000;
+  int samples_per_step = 4;
+  double learning_rate = 1e-4;  // highest
+  double warmup_share = 0.05;   // of the steps, in which the rate rises
+  double decay_share = 0.95;    // of the steps, the last, in which it falls
+  double weight_decay = 0.05;
+  double max_gradient_norm = 1.0;
+  double ema_decay = 0.0;  // of the weights that are written; 0 = those of the last step
+
+  std::string device = "cpu";
+  bool bfloat16 = false;  // products
+  bool recompute_blocks = false;
+  int num_threads = 0;
+
+  // Held-out scenes that are looked at every so many steps, and at the end.
+  int64_t validate_every = 500;
+  int num_validation_scenes = 32;
+  // How often the state is written, so that a killed run goes on from there.
+  double save_every_sec = 120.0;
+
+  // Throws std::invalid_argument naming the field that is out of its range.
+  void Check() const;
+};
+
+// Of one step; means over its samples.
+struct TrainingStep {
+  int64_t step = 0;  // counted from 0
+  double learning_rate = 0.0;
+  double loss = 0.0;                                   // weighted sum
+  std::array<double, kNumTrainingLosses> losses = {};  // not weighted
+};
+
+// Of predictions on held-out scenes, each scene in the frame of its first view, scales by medians.
+struct ValidationScore {
+  int64_t step = 0;  // that were done
+  double mask_f1 = 0.0;
+  double mask_iou = 0.0;
+  double mask_precision = 0.0;
+  double mask_recall = 0.0;
+  double abs_rel = 0.0;             // depth
+  double within_1_25 = 0.0;         // share of depths
+  double rotation_deg = 0.0;        // median over pairs of views
+  double direction_deg = 0.0;       // of the translation, likewise
+  double pairs_within_5_deg = 0.0;  // share of pairs, both errors
+  // Mean confidence on distractors over that on static pixels.
+  double confidence_ratio = 0.0;
+};
+
+struct TrainSummary {
+  int64_t num_steps = 0;
+  int64_t num_trained = 0;  // parameters
+  std::vector<ValidationScore> validations;
+  double seconds = 0.0;  // of this run
+  double peak_memory_gib = 0.0;
+};
+
+// Trains, and goes on where a run that was stopped left off. `output_path` becomes a folder with
+//   weights.safetensors   what was trained: LoRA and distractor head under their official names, or
+//                         the whole network; the sizes that shapes do not tell as metadata
+//   state.safetensors     all that a resumed run needs; written beside and renamed
+//   log.jsonl             one line per step and per validation
+// Law: a run that was killed and resumed ends with the same bits as one that was not, with the same
+// options, machine and number of threads. Throws Error if the weights, photos or masks are not
+// usable, if the folder holds a run with other options, or if the loss is not finite.
+TrainSummary Train(const TrainOptions& options,
+                   const std::filesystem::path& output_path,
+                   const ProgressCallback& progress = {});
+
+}  // namespace vgtw
