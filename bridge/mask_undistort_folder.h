@@ -17,16 +17,13 @@ struct UndistortMasksOptions {
 };
 
 // Masks for the images that `colmap image_undistorter` wrote (which does not undistort masks), as
-// its stereo_fusion and splatting trainers need them: one per image of <undistorted_folder>/sparse
-// (or sparse/0, where trainers expect it), named by MaskPath; see UndistortMask. `mask_folder`
-// holds the masks of the original photos, `model_folder` the sparse model before undistortion. A
-// mask has the size of the image below <undistorted_folder>/images, or of the undistorted camera
-// where that is missing: with --max_image_size, COLMAP 3.8 shrinks the images of PINHOLE cameras
-// and leaves their cameras as they were. Without `undistorted_folder` ("") every camera must be
-// SIMPLE_PINHOLE or PINHOLE, which image_undistorter leaves as they are, and the masks are those of
-// the photos. The folder appears complete or not at all. Throws Error if a model is unreadable, an
-// undistorted image is not in the model before or has another aspect than its camera, or a mask is
-// missing, unreadable or not of its photo's size.
+// its stereo_fusion and splatting trainers need them: one per image of FindUndistortedImages, named
+// by MaskPath; see UndistortMask. `mask_folder` holds the masks of the original photos,
+// `model_folder` the sparse model before undistortion. Without `undistorted_folder` ("") every
+// camera must be SIMPLE_PINHOLE or PINHOLE, which image_undistorter leaves as they are, and the
+// masks are those of the photos. The folder appears complete or not at all. Throws Error if a model
+// is unreadable, an undistorted image is not in the model before or has another aspect than its
+// camera, or a mask is missing, unreadable or not of its photo's size.
 std::vector<MaskSummary> UndistortMasks(const std::filesystem::path& mask_folder,
                                         const std::filesystem::path& model_folder,
                                         const std::filesystem::path& undistorted_folder,

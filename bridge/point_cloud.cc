@@ -2,6 +2,7 @@
 #include "bridge/point_cloud.h"
 
 #include "bridge/byte_reader.h"
+#include "bridge/surface_cloud.h"
 #include "scene/error.h"
 #include "scene/files.h"
 
@@ -283,16 +284,7 @@ std::vector<ColoredPoint> PointsOf(const Reconstruction& reconstruction) {
 }
 
 void WritePly(const std::filesystem::path& path, const std::vector<ColoredPoint>& points) {
-  AtomicFile file(path);
-  file.Write("ply\nformat binary_little_endian 1.0\nelement vertex " +
-             std::to_string(points.size()) +
-             "\nproperty float x\nproperty float y\nproperty float z\n"
-             "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n");
-  for (const ColoredPoint& point : points) {
-    file.Write(std::as_bytes(std::span(point.xyz.data(), 3)));
-    file.Write(std::as_bytes(std::span(point.rgb)));
-  }
-  file.Commit();
+  WritePly(path, SurfaceCloud{.points = points, .normals = {}, .scalars = {}});
 }
 
 std::vector<ColoredPoint> ParsePly(std::span<const std::byte> bytes,
@@ -325,19 +317,7 @@ std::vector<ColoredPoint> ReadPly(const std::filesystem::path& path) {
 }
 
 void WritePcd(const std::filesystem::path& path, const std::vector<ColoredPoint>& points) {
-  AtomicFile file(path);
-  const std::string count = std::to_string(points.size());
-  file.Write(
-      "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\n"
-      "COUNT 1 1 1 1\nWIDTH " +
-      count + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + count + "\nDATA binary\n");
-  for (const ColoredPoint& point : points) {
-    file.Write(std::as_bytes(std::span(point.xyz.data(), 3)));
-    const auto [red, green, blue] = point.rgb;
-    const uint32_t packed = uint32_t{red} << 16 | uint32_t{green} << 8 | blue;
-    file.Write(std::as_bytes(std::span(&packed, 1)));
-  }
-  file.Commit();
+  WritePcd(path, SurfaceCloud{.points = points, .normals = {}, .scalars = {}});
 }
 
 }  // namespace vgtw

@@ -2,9 +2,8 @@
 #include "bridge/seed_points.h"
 
 #include "bridge/point_cloud.h"
+#include "bridge/static_depths.h"
 #include "bridge/voxel_grid.h"
-#include "scene/confidence_histogram.h"
-#include "scene/error.h"
 #include "scene/image_io.h"
 #include "scene/parallel.h"
 #include "scene/static_view.h"
@@ -12,15 +11,10 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <filesystem>
-#include <mutex>
-#include <string>
 #include <utility>
 
 namespace vgtw {
 namespace {
-
-constexpr Rgb kGray = {128, 128, 128};
 
 // Points while they are merged: floats in units of the voxels' edge around the cameras, so that
 // neither large world coordinates nor the size of the scene cost precision.
@@ -59,18 +53,6 @@ class SeedPointMaker {
         options_(options),
         reconstruction_(reconstruction),
         frame_(MakeMergeFrame(reconstruction, options.voxel_size)) {}
-
-  double FindConfidenceThreshold() const {
-    ConfidenceHistogram histogram;
-    std::mutex mutex;
-    ForEachView([&](size_t i) {
-      ConfidenceHistogram of_view;
-      Load(i).AddConfidencesTo(of_view);
-      const std::lock_guard lock(mutex);
-      histogram.Add(of_view);
-    });
-    return histogram.ThresholdKeeping(options_.keep_percent);
-  }
 
   // Views enter in their order and merges depend on sizes only, so the number of threads does not
   // change the result.
@@ -151,29 +133,13 @@ class SeedPointMaker {
   std::vector<ColoredPoint> ColorPoints(size_t i, double confidence_threshold) const {
     std::vector<ColoredPoint> colored;
     RgbImage photo;
-    if (!options_.image_folder.empty()) photo = ReadPhoto(i);
+    if (!options_.image_folder.empty()) {
+      photo = ReadPhotoOf(predictions_.views()[views_[i].view_idx], options_.image_folder);
+    }
     for (const StaticView::Point& point : Load(i).StaticPoints(confidence_threshold)) {
-      const auto x = static_cast<int>(point.pixel_in_original.x());
-      const auto y = static_cast<int>(point.pixel_in_original.y());
-      colored.push_back({frame_.FromWorld(point.xyz), photo.Contains(x, y) ? photo(x, y) : kGray});
+      colored.push_back({frame_.FromWorld(point.xyz), ColorAt(photo, point.pixel_in_original)});
     }
     return frame_.has_voxels ? MergeInVoxels(colored) : colored;
-  }
-
-  RgbImage ReadPhoto(size_t i) const {
-    const std::filesystem::path path =
-        options_.image_folder / predictions_.views()[views_[i].view_idx].name;
-    RgbImage photo = ReadRgbImage(path);
-    const Camera& camera = CameraOf(i);
-    if (static_cast<uint64_t>(photo.width()) != camera.width ||
-        static_cast<uint64_t>(photo.height()) != camera.height) {
-      Fail(path,
-           std::to_string(photo.width()) + " x " + std::to_string(photo.height()) + " pixels",
-           std::to_string(camera.width) + " x " + std::to_string(camera.height) +
-               " as in the predictions",
-           "give the photos that were predicted from");
-    }
-    return photo;
   }
 
   std::vector<Sighting> FindSightings(size_t i, const std::vector<ColoredPoint>& points) const {
@@ -202,7 +168,10 @@ void AddSeedPoints(const PredictionReader& predictions,
                    Reconstruction& reconstruction,
                    SeedSummary& summary) {
   SeedPointMaker maker(predictions, views, options, reconstruction);
-  summary.confidence_threshold = maker.FindConfidenceThreshold();
+  std::vector<size_t> view_idxs;
+  for (const SeedView& view : views) view_idxs.push_back(view.view_idx);
+  summary.confidence_threshold =
+      PooledConfidenceThreshold(predictions, view_idxs, options.keep_percent, options.num_threads);
   maker.AddObserved(maker.MergePoints(summary.confidence_threshold));
   size_t num_observations = 0;
   for (const auto& [id, point] : reconstruction.points3D) num_observations += point.track.size();

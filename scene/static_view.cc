@@ -74,14 +74,14 @@ std::vector<StaticView::Point> StaticView::StaticPoints(double confidence_thresh
   std::vector<Point> points;
   for (int y = 0; y < depth.height(); ++y) {
     for (int x = 0; x < depth.width(); ++x) {
-      if (!prediction_.depth_conf.empty() &&
-          !(prediction_.depth_conf(x, y) >= confidence_threshold)) {
-        continue;
-      }
+      const float confidence = prediction_.depth_conf.empty() ? 1.0f : prediction_.depth_conf(x, y);
+      if (!prediction_.depth_conf.empty() && !(confidence >= confidence_threshold)) continue;
       const Eigen::Vector2d pixel =
           Apply(view.original_from_network, Eigen::Vector2d(x + 0.5, y + 0.5));
       if (!IsStatic(pixel)) continue;
-      if (const auto point = UnprojectPixel(view, depth, x, y)) points.push_back({*point, pixel});
+      if (const auto point = UnprojectPixel(view, depth, x, y)) {
+        points.push_back({*point, pixel, confidence});
+      }
     }
   }
   if (!depth.empty()) return points;
@@ -90,7 +90,9 @@ std::vector<StaticView::Point> StaticView::StaticPoints(double confidence_thresh
     if (!(sample.confidence >= confidence_threshold) || !IsStatic(pixel)) continue;
     const auto ray = Unproject(view.camera, pixel);
     if (!ray) continue;
-    points.push_back({Inverse(view.cam_from_world) * (sample.depth * ray->homogeneous()), pixel});
+    points.push_back({Inverse(view.cam_from_world) * (sample.depth * ray->homogeneous()),
+                      pixel,
+                      sample.confidence});
   }
   return points;
 }

@@ -19,6 +19,7 @@ class StaticView {
   struct Point {
     Eigen::Vector3d xyz;                // world
     Eigen::Vector2d pixel_in_original;  // where its depth was measured
+    float confidence = 1.0f;            // 1 where none is given
   };
 
   // A pixel is static if its distractor probability is known and below the threshold; without a
