@@ -265,6 +265,20 @@ void TintForUse(SurfaceUse use, Surface& surface, RandomStream& random) {
           Mix(Eigen::Vector3f(0.25f, 0.45f, 0.15f), Eigen::Vector3f(0.55f, 0.60f, 0.25f), tone);
       return SetColours(surface, 0.25f * leaf, leaf);
     }
+    case SurfaceUse::kWood: {
+      const Eigen::Vector3f brown =
+          Mix(Eigen::Vector3f(0.42f, 0.26f, 0.16f), Eigen::Vector3f(0.85f, 0.70f, 0.50f), tone);
+      if (random.Chance(0.75)) SetColours(surface, 0.6f * brown, brown);
+      return;
+    }
+    case SurfaceUse::kWall:
+    case SurfaceUse::kFloor:
+    case SurfaceUse::kCeiling:
+    case SurfaceUse::kFacade:
+      for (Texture::Colours& face : surface.texture.faces) {
+        face.dark = Mix(face.dark, face.light, 0.6f * tone);
+      }
+      return;
     case SurfaceUse::kGlass:
       return SetColours(surface,
                         Eigen::Vector3f(0.06f, 0.07f, 0.09f),
@@ -291,8 +305,8 @@ void TintForUse(SurfaceUse use, Surface& surface, RandomStream& random) {
 TextureStyle StyleFor(SurfaceUse use, double size) {
   const bool is_large = use == SurfaceUse::kWall || use == SurfaceUse::kFloor ||
                         use == SurfaceUse::kCeiling || use == SurfaceUse::kFacade;
-  if (is_large) return {.scale = 1.0, .max_saturation = 0.35, .hue_range = 0.15};
-  return {.scale = std::clamp(size, 0.05, 2.0), .max_saturation = 0.8, .hue_range = 0.1};
+  if (is_large) return {.scale = 1.0, .max_saturation = 0.3, .hue_range = 0.15};
+  return {.scale = std::clamp(size, 0.05, 2.0), .max_saturation = 0.65, .hue_range = 0.2};
 }
 
 }  // namespace

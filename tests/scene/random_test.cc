@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <set>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -33,6 +34,20 @@ TEST(RandomStream, UniformHasItsMeanAndVariance) {
   const double variance = 16.0 / 12.0;
   EXPECT_NEAR(sum / n, 1.0, 5.0 * std::sqrt(variance / n));
   EXPECT_NEAR(sum_of_squares / n, variance + 1.0, 5.0 * 2.5 / std::sqrt(n));
+}
+
+// Five standard errors of n draws.
+TEST(RandomStream, IndicesAndChancesHaveTheirShares) {
+  RandomStream random(5);
+  constexpr int n = 30000;
+  int num_true = 0;
+  std::vector<int> counts(3, 0);
+  for (int i = 0; i < n; ++i) {
+    ++counts.at(random.Index(3));
+    num_true += random.Chance(0.2) ? 1 : 0;
+  }
+  for (const int count : counts) EXPECT_NEAR(count, n / 3, 5.0 * std::sqrt(n * 2.0 / 9.0));
+  EXPECT_NEAR(num_true, 0.2 * n, 5.0 * std::sqrt(n * 0.16));
 }
 
 TEST(RandomStream, NormalHasItsMoments) {
