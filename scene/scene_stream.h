@@ -60,9 +60,10 @@ struct SceneSample {
 
 // An endless stream of procedural scenes for training: rooms, table tops, streets and facades with
 // furniture, people and cars; varied cameras, light, textures and exposure. Outdoors the sky is a
-// dome, whose depth (70 to 90 scene units) is finite and as consistent as that of a wall.
-// Laws: a sample is a function of options (with the texture folder's content) and idx alone. Where
-// a scene has distractors, they cover 2 to 35 % of its images' pixels together.
+// dome as consistent between views as a wall; its z-depth is above 75 scene units, while of all
+// else only the ground reaches beyond 60. Laws: a sample is a function of options (with the texture
+// folder's content) and idx alone. Where a scene has distractors, they cover 2 to 35 % of its
+// images' pixels together.
 class SceneStream {
  public:
   // Throws Error if texture_folder is set, but is missing, holds no image or a damaged one.

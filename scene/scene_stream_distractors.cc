@@ -95,6 +95,21 @@ class Director {
     return place;
   }
 
+  // The same away from `places`, where the floor is large enough.
+  Vector3d DrawPlaceElsewhere(const CastMember& member,
+                              size_t view_idx,
+                              const std::vector<Vector3d>& places) {
+    constexpr int kMaxTries = 6;
+    const double min_step = 0.5 * member.size * member.body.radius;
+    for (int i = 0; i < kMaxTries; ++i) {
+      const Vector3d place = DrawPlace(member, view_idx);
+      const auto is_near = [&](const Vector3d& other) { return (other - place).norm() < min_step; };
+      if (std::none_of(places.begin(), places.end(), is_near)) return place;
+    }
+    const double yaw_rad = DrawYaw();
+    return places.back() + min_step * Vector3d(std::cos(yaw_rad), std::sin(yaw_rad), 0.0);
+  }
+
   Vector3d DrawPlaceInView(size_t view_idx) {
     const StreamView& view = views_[view_idx];
     const Eigen::Matrix3d cam_from_world = view.cam_from_world.rotation.toRotationMatrix();
@@ -145,9 +160,11 @@ class Director {
   ActorsByView Jump(const CastMember& member) {
     const bool turns = random_.Chance(0.5);
     double yaw_rad = DrawYaw();
+    std::vector<Vector3d> places;
     ActorsByView actors;
     for (size_t i = 0; i < views_.size(); ++i) {
-      const Vector3d place = DrawPlace(member, i);
+      const Vector3d place = DrawPlaceElsewhere(member, i, places);
+      places.push_back(place);
       if (turns) yaw_rad = DrawYaw();
       actors.push_back(OnFloor(Animate(member), {place, yaw_rad, member.size}));
     }

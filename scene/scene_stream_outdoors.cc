@@ -11,11 +11,11 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 void AddGroundAndSky(Furnisher& furnisher) {
-  const double radius = furnisher.Draw(70.0, 90.0);
+  const double radius = furnisher.Draw(130.0, 170.0);
   const int sky = furnisher.Look(SurfaceUse::kSky, 50.0);
   const int ground = furnisher.Look(SurfaceUse::kGround, 2.0);
   furnisher.Add(ShapeKind::kDome, Vector3d::Zero(), Vector3d::Constant(radius), sky);
-  furnisher.AddBox({0.0, 0.0, -0.5}, {100.0, 100.0, 0.5}, ground);
+  furnisher.AddBox({0.0, 0.0, -0.5}, {200.0, 200.0, 0.5}, ground);
 }
 
 // The street runs along y; `side` is -1 or 1.
@@ -45,7 +45,7 @@ void AddHouse(Furnisher& furnisher, const House& house) {
 
 void AddHouses(Furnisher& furnisher, double side, double half_street) {
   constexpr double kBegin = -12.0;
-  constexpr double kEnd = 35.0;
+  constexpr double kEnd = 30.0;
   for (double y = kBegin; y < kEnd;) {
     House house{.side = side, .x = 0.0, .y = y, .half_width = 0.0, .height = 0.0};
     house.half_width = furnisher.Draw(2.0, 6.0);

@@ -56,10 +56,6 @@ PhotoTexture::PhotoTexture(const RgbImage& photo) {
   }
 }
 
-float PhotoTexture::AspectRatio() const {
-  return static_cast<float>(levels_[0].width()) / static_cast<float>(levels_[0].height());
-}
-
 Eigen::Vector3f PhotoTexture::ColourAt(const Eigen::Vector2f& position, float footprint) const {
   const float footprint_px = footprint * static_cast<float>(levels_[0].width());
   const int level_idx = std::clamp(std::ilogb(std::max(footprint_px, 1.0f) * 1.41421356f),

@@ -16,9 +16,6 @@ class PhotoTexture {
  public:
   explicit PhotoTexture(const RgbImage& photo);
 
-  // Width over height.
-  float AspectRatio() const;
-
   // RGB in [0,1] at `position` in units of the photo's width (y down from its top edge), averaged
   // over about a square of side `footprint` (same units, > 0).
   Eigen::Vector3f ColourAt(const Eigen::Vector2f& position, float footprint) const;

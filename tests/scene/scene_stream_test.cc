@@ -228,6 +228,30 @@ TEST(SceneStream, StaticDepthsOfNeighboursAgree) {
   EXPECT_LT(errors[errors.size() / 2], 2e-4);
 }
 
+TEST(SceneStream, OnlySkyAndGroundAreFar) {
+  SceneStreamOptions options = SmallOptions();
+  options.distractor_share = 0.0;
+  size_t num_sky = 0;
+  for (uint64_t idx = 0; idx < 80; ++idx) {
+    const StreamWorld world = WorldOf(options, idx);
+    for (const StreamView& view : world.views) {
+      for (size_t p = 0; p < view.coarse.depth.size(); ++p) {
+        const float depth = view.coarse.depth.data()[p];
+        const auto piece_idx = static_cast<size_t>(view.coarse.index.data()[p]);
+        const Piece& piece = world.stage.pieces[piece_idx];
+        const bool is_ground = piece.solid.half_size.minCoeff() == 0.5 && piece_idx == 1;
+        if (piece.solid.kind == ShapeKind::kDome) {
+          ++num_sky;
+          EXPECT_GT(depth, 75.0f);
+        } else if (!is_ground) {
+          EXPECT_LT(depth, 60.0f);
+        }
+      }
+    }
+  }
+  EXPECT_GT(num_sky, 1000u);
+}
+
 // Pieces of all views' distractors by their surface.
 std::set<int> SurfacesOf(const std::vector<Piece>& pieces) {
   std::set<int> surfaces;
