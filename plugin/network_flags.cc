@@ -55,7 +55,8 @@ void NetworkFlags::DeclareImageSize(Flags& flags) {
   flags.Group("Algorithm")
       .Add("side_px",
            &options_.side_px,
-           "Width of the network's image, pixels, a multiple of 14; 0 = that of its training, 518 for "
+           "Width of the network's image, pixels, a multiple of 14; 0 = that of its training, 518 "
+           "for "
            "the published ones (not pi3)")
       .Add("max_pixels", &options_.max_pixels, "Pixels of the network's image (pi3)");
 }

@@ -13,8 +13,9 @@ set(folders_of_plugin plugin scene matching bridge refine evaluation)
 set(folders_of_examples examples scene network matching bridge refine evaluation)
 # The program must start fast, so only the network's own program sees the network.
 set(folders_of_network_program ${folders_of_plugin} network)
-set(network_program plugin/command_predict.cc plugin/command_probe.cc plugin/command_weights.cc
-    plugin/network_flags.cc plugin/network_flags.h plugin/network_main.cc)
+set(network_program plugin/command_predict.cc plugin/command_probe.cc plugin/command_train.cc
+    plugin/command_weights.cc plugin/network_flags.cc plugin/network_flags.h
+    plugin/network_main.cc)
 
 set(heavy_libraries torch ceres opencv sqlite pcl zip json cli deflate exif openssl)
 set(pattern_of_torch "^(torch|ATen|c10)/")
