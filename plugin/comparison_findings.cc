@@ -28,7 +28,7 @@ bool IsWorse(const json& before, const json& after, double min_difference) {
 }
 
 std::string Change(const json& before, const json& after, int digits, const std::string& unit) {
-  return FormatNumber(before, digits) + " -> " + FormatNumber(after, digits) + " " + unit;
+  return "from " + FormatNumber(before, digits) + " to " + FormatNumber(after, digits) + " " + unit;
 }
 
 struct Guilt {
@@ -57,7 +57,7 @@ Guilt GuiltOf(const json& view) {
     if (IsWorse(before.at("rotation_error_deg"), after.at("rotation_error_deg"), kMinWorseDeg)) {
       guilt.Add(
           5.0,
-          "farther from the reference, " +
+          "farther from the reference, rotation error " +
               Change(before.at("rotation_error_deg"), after.at("rotation_error_deg"), 3, "deg"));
     }
     if (IsWorse(before.at("held_out_px"), after.at("held_out_px"), kMinWorsePx)) {
@@ -113,9 +113,9 @@ std::string AgainstReference(const json& first, const json& last) {
 std::string FiguresOfReference(const json& first, const json& last) {
   const json& before = first.at("pose_error");
   const json& after = last.at("pose_error");
-  return "Rotations " +
+  return "Rotation errors went " +
          Change(before.at("rotation_median_deg"), after.at("rotation_median_deg"), 3, "deg") +
-         " (median over pairs), centres " +
+         " (median over pairs), those of centres " +
          Change(before.at("centre_rmse_percent"), after.at("centre_rmse_percent"), 3, "%") +
          " of the extent (RMSE, Sim3-aligned), " +
          std::to_string(after.at("num_views").get<int>()) + " photos.";
@@ -132,8 +132,8 @@ std::string ByHeldOut(const json& first, const json& last) {
 }
 
 std::string FiguresOfHeldOut(const json& first, const json& last) {
-  return "Tracks held out of refinement reproject at " +
-         Change(first.at("held_out_px"), last.at("held_out_px"), 3, "px") + " (robust mean error).";
+  return "The error of tracks held out of refinement went " +
+         Change(first.at("held_out_px"), last.at("held_out_px"), 3, "px") + " (robust mean).";
 }
 
 std::string Size(const json& model) {

@@ -84,8 +84,8 @@ std::string Conclusion(const RefineModelResult& result) {
   if (!result.IsRefined()) {
     return "nothing was refined: poses and intrinsics are the seed's\n";
   }
-  return "error of the " + std::to_string(result.num_held_out_tracks) +
-         " tracks held out: " + FormatNumber(result.held_out_before_px, 3) + " px -> " +
+  return "error of the " + std::to_string(result.num_held_out_tracks) + " tracks held out: from " +
+         FormatNumber(result.held_out_before_px, 3) + " to " +
          FormatNumber(result.held_out_after_px, 3) + " px\n";
 }
 

@@ -45,7 +45,7 @@ function chartRow(row, y, layout, scale, unit) {
   const before = isNumber(row.before) ? layout.left + scale.at(row.before) * layout.width : null;
   const after = isNumber(row.after) ? layout.left + scale.at(row.after) * layout.width : null;
   const says = [isNumber(row.before) && formatNumber(row.before), isNumber(row.after) && formatNumber(row.after)]
-    .filter(Boolean).join(' → ');
+    .filter(Boolean).join(' to ');
   const marks = [];
   if (row.bar && after !== null) {
     marks.push(svg('rect', { class: 'bar', x: layout.left, y: y - 5, width: Math.max(1, after - layout.left), height: 10 }));

@@ -264,9 +264,16 @@ class Stage {
     requestAnimationFrame(() => { this.pending = false; this.renderer.render(this.scene, this.eye); });
   }
 
+  // For paper: in light colours, whatever those of the screen are.
   picture() {
+    const { classList } = document.documentElement;
+    classList.add('paper');
+    this.build();
     this.renderer.render(this.scene, this.eye);
-    return this.canvas.toDataURL('image/png');
+    const url = this.canvas.toDataURL('image/png');
+    classList.remove('paper');
+    this.build();
+    return url;
   }
 }
 

@@ -97,7 +97,7 @@ function showViews() {
   byId('views').hidden = views.length === 0;
   if (views.length === 0) return;
   put(byId('views'), el('h2', { id: 'views-title' }, 'The photos'),
-    el('p', { class: 'help' }, 'Choose a photo for its details; there, arrow keys lead to the next.'),
+    el('p', { class: 'help hint' }, 'Choose a photo for its details; there, arrow keys lead to the next.'),
     gridControls(), overlayLegend(), el('ul', { id: 'grid', class: 'grid' }), viewTable());
   fillGrid();
 }

@@ -46,6 +46,12 @@ ReportInBrowser::ReportInBrowser(const nlohmann::json& data) {
 std::string ReportInBrowser::Run(const Visit& visit,
                                  const std::vector<std::string>& arguments) const {
   WriteFileAtomically(folder_ / "harness.html", HarnessPage(visit));
+  return Open("harness.html", visit.dark, arguments);
+}
+
+std::string ReportInBrowser::Open(const std::string& page,
+                                  bool dark,
+                                  const std::vector<std::string>& arguments) const {
   std::vector<std::string> all = {"120",
                                   BrowserExecutable(),
                                   "--headless=new",
@@ -60,9 +66,9 @@ std::string ReportInBrowser::Run(const Visit& visit,
                                   "--enable-logging=stderr",
                                   "--window-size=1280," + std::to_string(kWindowHeight),
                                   "--user-data-dir=" + (folder_ / "profile").string()};
-  if (visit.dark) all.push_back("--blink-settings=preferredColorScheme=0");
+  if (dark) all.push_back("--blink-settings=preferredColorScheme=0");
   all.insert(all.end(), arguments.begin(), arguments.end());
-  all.push_back("file://" + (folder_ / "harness.html").string());
+  all.push_back("file://" + (folder_ / page).string());
   const SubprocessResult result =
       RunSubprocess(FindExecutable("timeout"), all, {}, [](const std::string& line) {
         if (IsConsoleMessage(line)) ADD_FAILURE() << "console: " << line;
@@ -85,6 +91,12 @@ nlohmann::json ReportInBrowser::Ask(const Visit& visit) const {
   EXPECT_FALSE(answer.is_discarded()) << output;
   EXPECT_FALSE(answer.is_object() && answer.contains("error")) << answer;
   return answer;
+}
+
+std::filesystem::path ReportInBrowser::Print(bool dark) const {
+  const std::filesystem::path path = folder_ / "printed.pdf";
+  Open("report.html", dark, {"--print-to-pdf=" + path.string(), "--no-pdf-header-footer"});
+  return path;
 }
 
 RgbImage ReportInBrowser::SeeStage(Visit visit) const {

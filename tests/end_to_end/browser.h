@@ -31,11 +31,17 @@ class ReportInBrowser {
   // What the steps return.
   nlohmann::json Ask(const Visit& visit) const;
 
+  // The page on paper (US letter) as a PDF, which lives as long as this.
+  std::filesystem::path Print(bool dark) const;
+
   // After the steps, the 3D view alone, 400 x 300.
   RgbImage SeeStage(Visit visit) const;
 
  private:
   std::string Run(const Visit& visit, const std::vector<std::string>& arguments) const;
+  std::string Open(const std::string& page,
+                   bool dark,
+                   const std::vector<std::string>& arguments) const;
 
   TemporaryFolder folder_;
 };

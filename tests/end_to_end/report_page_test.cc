@@ -3,12 +3,14 @@
 #include "plugin/report_page.h"
 
 #include "plugin/base64.h"
+#include "plugin/subprocess.h"
 #include "tests/end_to_end/browser.h"
 
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <regex>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -299,6 +301,78 @@ TEST(ReportPageInBrowser, MissingPartsAreLeftOut) {
     const size_t num_models = cases[i].value("models", json::array()).size();
     const size_t num_views = cases[i].value("views", json::array()).size();
     EXPECT_EQ(answer, json({two, num_models, num_views})) << "case " << i;
+  }
+}
+
+#define VGTW_NEED_PRINT()                                         \
+  VGTW_NEED_BROWSER();                                            \
+  if (FindExecutable("pdftotext").empty()) {                      \
+    GTEST_SKIP() << "pdftotext not found: install poppler-utils"; \
+  }                                                               \
+  static_assert(true)
+
+std::string OutputOf(const std::string& program, const std::vector<std::string>& arguments) {
+  const SubprocessResult result = RunSubprocess(FindExecutable(program), arguments);
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  return result.output;
+}
+
+// More models than fit side by side on a screen, and names as long as folders have them.
+json WithManyModels() {
+  json data = MakeData();
+  for (int k = 2; k < 7; ++k) {
+    data["models"].push_back(
+        ModelOf("refined_with_masks_and_priors_" + std::to_string(k), "other", 100.25 + k));
+    data["scene"]["models"].push_back({{"cameras", CamerasOf(5, 0.3)}, {"points", nullptr}});
+    for (json& view : data["views"]) view["by_model"].push_back(nullptr);
+  }
+  return data;
+}
+
+// Tables are cut neither at the paper's edge nor by a scroll bar: the values of every model are
+// there, and no word lies beyond the page.
+TEST(ReportPageInBrowser, PaperHoldsTheWholeTable) {
+  VGTW_NEED_PRINT();
+  const ReportInBrowser report(WithManyModels());
+  const std::string pdf = report.Print(false).string();
+  const std::string text = OutputOf("pdftotext", {"-layout", pdf, "-"});
+  EXPECT_THAT(text, testing::HasSubstr("After is better than before."));
+  for (const char* value : {"2 px", "0.500 px", "102 px", "103 px", "104 px", "105 px", "106 px"}) {
+    EXPECT_THAT(text, testing::ContainsRegex("Reprojection error .* " + std::string(value)));
+  }
+  EXPECT_THAT(text, testing::HasSubstr("4.jpg"));
+  EXPECT_THAT(text, testing::Not(testing::HasSubstr("arrow keys")));
+  const std::string boxes = OutputOf("pdftotext", {"-bbox", pdf, "-"});
+  const std::regex word(R"re(<word xMin="([-\d.]+)" yMin="[-\d.]+" xMax="([-\d.]+)")re");
+  int num_words = 0;
+  for (std::sregex_iterator it(boxes.begin(), boxes.end(), word), end; it != end; ++it) {
+    ++num_words;
+    EXPECT_GE(std::stod((*it)[1]), 0.0);
+    EXPECT_LE(std::stod((*it)[2]), 612.0);  // points; 8.5 inch
+  }
+  EXPECT_GT(num_words, 200);
+}
+
+// A dark page would cost its reader a cartridge.
+TEST(ReportPageInBrowser, PaperHasALightPictureOfTheScene) {
+  VGTW_NEED_3D();
+  VGTW_NEED_PRINT();
+  const ReportInBrowser report(MakeData());
+  const TemporaryFolder folder;
+  for (const bool dark : {false, true}) {
+    const std::string page = folder / "page";
+    OutputOf("pdftoppm",
+             {"-r", "100", "-png", "-f", "1", "-l", "1", "-singlefile", report.Print(dark), page});
+    const RgbImage paper = ReadRgbImage(page + ".png");
+    int num_dark = 0, num_red = 0, num_blue = 0;
+    for (const Rgb& pixel : paper.data()) {
+      num_dark += pixel[0] < 60 && pixel[1] < 60 && pixel[2] < 60 ? 1 : 0;
+      num_red += pixel == kRed ? 1 : 0;
+      num_blue += pixel == kBlue ? 1 : 0;
+    }
+    EXPECT_LT(num_dark, static_cast<int>(paper.size()) / 20) << "dark: " << dark;
+    EXPECT_GT(num_red, 30) << "dark: " << dark;
+    EXPECT_GT(num_blue, 30) << "dark: " << dark;
   }
 }
 

@@ -64,9 +64,11 @@ TEST(Summarise, TheReferenceAnswersFirst) {
   EXPECT_TRUE(answer(0.3, 1.0).starts_with("'after' has better centres, but worse rotations"));
   const json figures =
       Summarise(Comparison(before, Model("after", PoseError(0.1, 1.0), 9.0))).at(1);
-  EXPECT_EQ(figures,
-            "Rotations 0.200 -> 0.100 deg (median over pairs), centres 2.000 -> 1.000 % of the "
-            "extent (RMSE, Sim3-aligned), 3 photos.");
+  EXPECT_EQ(
+      figures,
+      "Rotation errors went from 0.200 to 0.100 deg (median over pairs), those of centres from "
+      "2.000 to 1.000 % of the "
+      "extent (RMSE, Sim3-aligned), 3 photos.");
 }
 
 TEST(Summarise, WithoutAReferenceTracksHeldOutAnswer) {
@@ -105,12 +107,13 @@ TEST(FindGuiltyViews, NamesWhatGotWorseWorstFirst) {
   const json guilty = FindGuiltyViews(comparison);
   ASSERT_EQ(guilty.size(), 5u);
   EXPECT_EQ(guilty.at(0).at("name"), "missing.jpg");
-  EXPECT_EQ(
-      guilty.at(1),
-      (json{{"name", "farther.jpg"}, {"why", "farther from the reference, 0.500 -> 0.700 deg"}}));
+  EXPECT_EQ(guilty.at(1),
+            (json{{"name", "farther.jpg"},
+                  {"why", "farther from the reference, rotation error from 0.500 to 0.700 deg"}}));
   EXPECT_EQ(guilty.at(2), (json{{"name", "kept.jpg"}, {"why", "keeps its pose: too few"}}));
-  EXPECT_EQ(guilty.at(3),
-            (json{{"name", "worse.jpg"}, {"why", "tracks held out fit worse, 1.00 -> 1.20 px"}}));
+  EXPECT_EQ(
+      guilty.at(3),
+      (json{{"name", "worse.jpg"}, {"why", "tracks held out fit worse, from 1.00 to 1.20 px"}}));
   EXPECT_EQ(guilty.at(4), (json{{"name", "few.jpg"}, {"why", "only 12 observations"}}));
 }
 

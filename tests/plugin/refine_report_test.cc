@@ -30,7 +30,7 @@ TEST(FormatRefinement, SaysWhatWasBoughtAndWhatWasNot) {
   result.views[2].name = "b.jpg";
   result.views[2].reason = "too few";
   const std::string text = FormatRefinement(result);
-  EXPECT_THAT(text, HasSubstr("error of the 12 tracks held out: 3.250 px -> 0.500 px\n"));
+  EXPECT_THAT(text, HasSubstr("error of the 12 tracks held out: from 3.250 to 0.500 px\n"));
   EXPECT_THAT(text, HasSubstr("note: b.jpg keeps its pose: too few\n"));
   result.views[1].outcome = ViewOutcome::kRejected;
   result.views[1].reason = "worse";
