@@ -51,7 +51,8 @@ const std::vector<Command>& Commands() {
        "  vgtw mask undistort --mask_path masks/ --input_path sparse/0 --undistorted_path dense/ "
        "--output_path dense/masks"},
       {"mask score",
-       "Masks against true masks: F1, IoU, boundary F, features left and lost",
+       "Masks against true masks: F1, IoU, boundary F, features left and lost; also `evaluate "
+       "masks`",
        DeclareMaskScore,
        "  vgtw mask score --mask_path masks/ --reference_mask_path truth/ --database_path a.db"},
       {"mask preview",
@@ -90,7 +91,7 @@ const std::vector<Command>& Commands() {
        "--image_path photos/ --output_path report.html\n"
        "  vgtw compare seed/ refined/ colmap/sparse/0 --reference_path truth/ --csv_path "
        "figures.csv"},
-      {"evaluate", "Poses, points and depths against a reference, as numbers"},
+      {"evaluate", "Poses, points, depths and masks against a reference, as numbers"},
       {"evaluate pose",
        "ATE, RPE, RRA, RTA, AUC and the errors of each view",
        DeclareEvaluatePose,
@@ -109,12 +110,21 @@ const std::vector<Command>& Commands() {
        "  vgtw evaluate depth --input_path predictions/ --reference_path truth/\n"
        "  vgtw evaluate depth --input_path predictions/ --reference_path truth/ --method maps "
        "--keep_percent 100"},
+      {"evaluate masks",
+       "Masks: F1, IoU, boundary F, features left and lost; also `mask score`",
+       DeclareMaskScore,
+       "  vgtw evaluate masks --mask_path masks/ --reference_mask_path truth/ --database_path "
+       "a.db"},
       {"export",
-       "Cameras and points for other programs: PLY, PCD, transforms.json, TUM, KITTI",
+       "Cameras, points and depths for other programs: PLY, PCD, transforms.json, TUM, KITTI, "
+       "COLMAP",
        DeclareExport,
        "  vgtw export --input_path out/sparse/refined --format transforms --output_path "
        "transforms.json\n"
-       "  vgtw export --input_path predictions/ --format tum --label name --output_path poses.txt"},
+       "  vgtw export --input_path predictions/ --format tum --label name --output_path poses.txt\n"
+       "  vgtw export --input_path predictions/ --image_path photos/ --output_path dense.ply\n"
+       "  vgtw export --input_path predictions/ --format colmap_depth --model_path "
+       "out/sparse/refined --output_path dense/"},
       {"probe", kProbeSummary, {}, {}, BecomeNetworkProgram},
       {"train", kTrainSummary, {}, {}, BecomeNetworkProgram},
       {"weights", kWeightsSummary},

@@ -71,6 +71,22 @@ TEST_F(MaskTools, ScoreTellsTheMeanAndThePooledRatios) {
             "\"b \"\"2\"\".jpg\",1.000000,1.000000,1.000000,1.000000,1.000000,1.000000,1.000000\n");
 }
 
+TEST_F(MaskTools, EvaluateMasksIsTheSameCommand) {
+  const std::vector<std::string> flags = {
+      "--mask_path", "@masks", "--reference_mask_path", "@truth", "--json", "@score.json"};
+  std::vector<std::string> outputs;
+  std::vector<nlohmann::json> scores;
+  for (auto args : {std::vector<std::string>{"mask", "score"}, {"evaluate", "masks"}}) {
+    args.insert(args.end(), flags.begin(), flags.end());
+    const ColmapRun run = Run(args);
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+    outputs.push_back(run.output);
+    scores.push_back(ReadJson(folder_ / "score.json"));
+  }
+  EXPECT_EQ(outputs[0], outputs[1]);
+  EXPECT_EQ(scores[0], scores[1]);
+}
+
 TEST_F(MaskTools, ScoreNeedsOneThingToScore) {
   const ColmapRun run = Run({"mask", "score", "--reference_mask_path", "@truth"});
   EXPECT_EQ(run.exit_code, 1);
