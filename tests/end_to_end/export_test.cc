@@ -2,10 +2,14 @@
 // `vgtw export`, read back by the other commands.
 #include "bridge/colmap_model.h"
 #include "bridge/point_cloud.h"
+#include "bridge/predictions.h"
 #include "scene/files.h"
+#include "scene/image_io.h"
+#include "tests/bridge/colmap_map.h"
 #include "tests/end_to_end/run_vgtw.h"
 #include "tests/support/synthetic_model.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/wall_prediction.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -73,7 +77,76 @@ TEST_F(ExportTest, PointsAreTheModels) {
     EXPECT_EQ(points[i].xyz, model_.points3D.at(i + 1).xyz.cast<float>());
   }
   ASSERT_EQ(Export("pcd", "points.pcd").exit_code, 0);
-  EXPECT_THAT(ReadFile(folder_ / "points.pcd"), HasSubstr("POINTS 120\n"));
+  const std::string pcd = ReadFile(folder_ / "points.pcd");
+  EXPECT_THAT(pcd, HasSubstr("POINTS 120\n"));
+  EXPECT_THAT(pcd, HasSubstr("FIELDS x y z rgb error track_length\n"));
+}
+
+class ExportPredictionsTest : public testing::Test {
+ protected:
+  ExportPredictionsTest() {
+    WritePrediction(MakeWallPrediction(), predictions_, false);
+    for (const char* name : {"a.png", "b.png", "c.png"}) {
+      WriteImage(folder_.path() / "photos" / name, RgbImage(64, 48, Rgb{200, 100, 50}));
+    }
+  }
+
+  ColmapRun Export(std::vector<std::string> args) const {
+    const std::vector<std::string> first = {"export", "--input_path", predictions_};
+    args.insert(args.begin(), first.begin(), first.end());
+    return RunVgtw(args);
+  }
+
+  TemporaryFolder folder_;
+  const std::string predictions_ = (folder_ / "predictions").string();
+};
+
+TEST_F(ExportPredictionsTest, PointsHaveColoursAndNormalsAndCanBeThinned) {
+  const std::string path = (folder_ / "a.ply").string();
+  const std::vector<std::string> args = {"--image_path",
+                                         (folder_ / "photos").string(),
+                                         "--keep_percent",
+                                         "100",
+                                         "--output_path",
+                                         path};
+  const ColmapRun run = Export(args);
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("2304 points with colours, normals"));
+  EXPECT_THAT(ReadFile(path), HasSubstr("property float nz\n"));
+  const std::vector<ColoredPoint> all = ReadPly(path);
+  ASSERT_EQ(all.size(), 3u * 32 * 24);
+  EXPECT_EQ(all[0].rgb, (Rgb{200, 100, 50}));
+  EXPECT_NEAR(all[0].xyz.z(), kWallDepth, 1e-6);
+  std::vector<std::string> thin = args;
+  thin.insert(thin.end(), {"--voxel_size", "0.5", "--overwrite"});
+  ASSERT_EQ(Export(thin).exit_code, 0);
+  // The extent is 1: cubes of 0.5 over 6.2 x 4.
+  EXPECT_LT(ReadPly(path).size(), 150u);
+  EXPECT_GT(ReadPly(path).size(), 90u);
+}
+
+TEST_F(ExportPredictionsTest, DepthMapsLieWhereColmapLooksForThem) {
+  const std::string model = (folder_ / "seed").string();
+  const std::string dense = (folder_ / "dense").string();
+  ASSERT_EQ(RunVgtw({"seed", "--predictions_path", predictions_, "--output_path", model}).exit_code,
+            0);
+  const std::vector<std::string> args = {"--format", "colmap_depth", "--output_path", dense};
+  const ColmapRun without = Export(args);
+  EXPECT_EQ(without.exit_code, 1);
+  EXPECT_THAT(without.output, HasSubstr("--model_path"));
+  std::vector<std::string> with = args;
+  with.insert(with.end(), {"--model_path", model, "--keep_percent", "100"});
+  const ColmapRun run = Export(with);
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("written: 3 depth maps in"));
+  const ColmapMap depth = ReadColmapMap(folder_ / "dense/stereo/depth_maps/b.png.geometric.bin");
+  EXPECT_EQ(depth.width, 64);
+  EXPECT_NEAR(depth.At(10, 10, 0), kWallDepth, 1e-4);
+  EXPECT_EQ(ReadColmapMap(folder_ / "dense/stereo/normal_maps/b.png.geometric.bin").num_channels,
+            3);
+  const ColmapRun again = Export(with);
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_THAT(again.output, HasSubstr("--overwrite"));
 }
 
 TEST_F(ExportTest, RefusesWhatItCannotDo) {
