@@ -49,11 +49,11 @@ struct DepthMapSummary {
 // `workspace_folder` what image_undistorter wrote or, if that holds no sparse/, a folder for maps
 // of the photos themselves; then fusion.cfg (the names) is written beside them if there is none. So
 // `colmap stereo_fusion --input_type geometric`, its meshers and splatting trainers can read them.
-// Depth is read bilinearly (see SampleDepth) where the ray of a pixel meets the photo; a normal is
-// that of the nearest pixel of the prediction. Photos without a map of depths are left out. Each
-// of the two folders appears complete or not at all.
-// Throws Error as FindUndistortedImages does, if maps are there and not to be replaced, or if no
-// image of the model has a depth map.
+// Depth is read bilinearly (see SampleDepth) where the ray of a pixel's centre meets the photo; a
+// normal is that of the nearest pixel of the prediction. Photos without a map of depths are left
+// out. Each of the two folders appears complete or not at all. Throws Error as
+// FindUndistortedImages does, if maps are there and not to be replaced, or if no image of the model
+// has a depth map.
 std::vector<DepthMapSummary> WriteColmapDepthMaps(const PredictionReader& predictions,
                                                   const std::filesystem::path& model_folder,
                                                   const std::filesystem::path& workspace_folder,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/colmap_depth.h"
 #include "bridge/colmap_model.h"
+#include "bridge/export_glb.h"
 #include "bridge/export_points.h"
 #include "bridge/export_poses.h"
 #include "bridge/predictions.h"
@@ -57,8 +58,8 @@ struct ExportCommand {
     if (fs::exists(output_path) && !depth.overwrite) {
       Fail(output_path, "exists", "a new file", "name another or add --overwrite");
     }
-    const std::string written =
-        format == "ply" || format == "pcd" ? WritePoints(is_model) : WriteCameras(is_model);
+    const bool has_points = format == "ply" || format == "pcd" || format == "glb";
+    const std::string written = has_points ? WritePoints(is_model) : WriteCameras(is_model);
     Finish(usability,
            "written: " + output_path.string() + " (" + written + ")\n",
            {{"output_path", output_path.string()}, {"written", written}});
@@ -66,6 +67,12 @@ struct ExportCommand {
 
   std::string WritePoints(bool is_model) const {
     const SurfaceCloud cloud = is_model ? ModelCloud() : PredictedCloud();
+    const std::string num_points = std::to_string(cloud.points.size()) + " points with colours";
+    if (format == "glb") {
+      const std::vector<View> views = Views(is_model);
+      WriteGlb(output_path, cloud, views);
+      return num_points + ", " + std::to_string(views.size()) + " cameras";
+    }
     if (format == "ply") {
       WritePly(output_path, cloud);
     } else {
@@ -73,7 +80,7 @@ struct ExportCommand {
     }
     std::string with = cloud.normals.empty() ? "" : ", normals";
     for (const CloudScalar& scalar : cloud.scalars) with += ", " + scalar.name;
-    return std::to_string(cloud.points.size()) + " points with colours" + with;
+    return num_points + with;
   }
 
   SurfaceCloud ModelCloud() const {
@@ -89,9 +96,12 @@ struct ExportCommand {
     return PointsOfPredictions(PredictionReader(input_path), options, display.Callback());
   }
 
+  std::vector<View> Views(bool is_model) const {
+    return is_model ? ViewsOf(ReadModel(input_path)) : PredictionReader(input_path).views();
+  }
+
   std::string WriteCameras(bool is_model) const {
-    const std::vector<View> views =
-        is_model ? ViewsOf(ReadModel(input_path)) : PredictionReader(input_path).views();
+    const std::vector<View> views = Views(is_model);
     std::string text;
     if (format == "tum") {
       text = TumTrajectory(views,
@@ -172,9 +182,10 @@ void AddOutputFlags(Flags& flags, ExportCommand& command) {
                "or, where every camera is a pinhole, any")
       .AddChoice("format",
                  &command.format,
-                 {"ply", "pcd", "transforms", "tum", "kitti", "colmap_depth"},
+                 {"ply", "pcd", "glb", "transforms", "tum", "kitti", "colmap_depth"},
                  "ply, pcd: points, of predictions with normals and confidence, of a model with "
-                 "error (pixels) and track_length; transforms: nerfstudio's transforms.json; "
+                 "error (pixels) and track_length; glb: points and cameras as glTF; transforms: "
+                 "nerfstudio's transforms.json; "
                  "tum, kitti: trajectories of world_from_cam, in the order of names; colmap_depth: "
                  "stereo/depth_maps and stereo/normal_maps for stereo_fusion and splatting "
                  "trainers, in scene units of the model")

@@ -116,7 +116,7 @@ const std::vector<Command>& Commands() {
        "  vgtw evaluate masks --mask_path masks/ --reference_mask_path truth/ --database_path "
        "a.db"},
       {"export",
-       "Cameras, points and depths for other programs: PLY, PCD, transforms.json, TUM, KITTI, "
+       "Cameras, points and depths for other programs: PLY, PCD, glTF, transforms.json, TUM, KITTI, "
        "COLMAP",
        DeclareExport,
        "  vgtw export --input_path out/sparse/refined --format transforms --output_path "

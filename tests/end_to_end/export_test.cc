@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // `vgtw export`, read back by the other commands.
 #include "bridge/colmap_model.h"
+#include "bridge/export_glb.h"
 #include "bridge/point_cloud.h"
 #include "bridge/predictions.h"
 #include "scene/files.h"
@@ -123,6 +124,21 @@ TEST_F(ExportPredictionsTest, PointsHaveColoursAndNormalsAndCanBeThinned) {
   // The extent is 1: cubes of 0.5 over 6.2 x 4.
   EXPECT_LT(ReadPly(path).size(), 150u);
   EXPECT_GT(ReadPly(path).size(), 90u);
+}
+
+TEST_F(ExportPredictionsTest, GlbHoldsPointsAndCamerasWhereItsLibraryIs) {
+  const std::string path = (folder_ / "a.glb").string();
+  const ColmapRun run = Export({"--format", "glb", "--keep_percent", "100", "--output_path", path});
+  if (!CanWriteGlb()) {
+    EXPECT_EQ(run.exit_code, 1);
+    EXPECT_THAT(run.output, HasSubstr("libtinygltf-dev"));
+    return;
+  }
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("2304 points with colours, 3 cameras"));
+  const std::string glb = ReadFile(path);
+  EXPECT_TRUE(glb.starts_with("glTF"));
+  EXPECT_THAT(glb, HasSubstr("\"name\":\"c.png\""));
 }
 
 TEST_F(ExportPredictionsTest, DepthMapsLieWhereColmapLooksForThem) {
