@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/predictions_json.h"
 
+#include "bridge/json_fields.h"
 #include "scene/error.h"
 #include "scene/files.h"
 #include "scene/prediction.h"
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -19,87 +19,9 @@ using Json = nlohmann::json;
 
 constexpr char kFormat[] = "vgtw-predictions";
 constexpr int kVersion = 1;
-constexpr uint64_t kMaxSize = 65536;  // pixels
+constexpr char kHint[] = "write the predictions again";
 
-// Access to one JSON object; whatever is not as expected throws Error "<path>: <who> ...".
-class Fields {
- public:
-  Fields(const Json& object, std::string who, const std::filesystem::path& path)
-      : object_(object), who_(std::move(who)), path_(path) {
-    if (!object.is_object()) {
-      Fail(std::string("is a JSON ") + object.type_name(), "an object");
-    }
-  }
-
-  [[noreturn]] void Fail(const std::string& found, const std::string& expected) const {
-    vgtw::Fail(path_, who_ + " " + found, expected, "write the predictions again");
-  }
-
-  const Json& At(const char* key) const {
-    const auto found = object_.find(key);
-    if (found == object_.end()) Fail(std::string("lacks '") + key + "'", "it");
-    return *found;
-  }
-
-  std::string String(const char* key) const {
-    const Json& value = At(key);
-    if (!value.is_string()) FailType(key, value, "a string");
-    return value.get<std::string>();
-  }
-
-  // Finite numbers; `size` 0 = any number of them.
-  std::vector<double> Numbers(const char* key, size_t size) const {
-    return NumbersOf(key, At(key), size);
-  }
-
-  std::vector<double> NumbersOf(const char* key, const Json& array, size_t size) const {
-    const std::string expected =
-        "an array of " + (size == 0 ? "" : std::to_string(size) + " ") + "finite numbers";
-    if (!array.is_array() || (size != 0 && array.size() != size)) FailType(key, array, expected);
-    std::vector<double> values;
-    for (const Json& element : array) {
-      if (!element.is_number()) FailType(key, element, expected);
-      values.push_back(element.get<double>());
-      if (!std::isfinite(values.back())) FailType(key, element, expected);
-    }
-    return values;
-  }
-
-  // [width, height] in pixels.
-  std::array<uint64_t, 2> Size(const char* key) const {
-    const Json& array = At(key);
-    const auto is_size = [](const Json& value) {
-      return value.is_number_unsigned() && value.get<uint64_t>() <= kMaxSize;
-    };
-    if (!array.is_array() || array.size() != 2 ||
-        !std::all_of(array.begin(), array.end(), is_size)) {
-      FailType(key, array, "[width, height] in pixels up to " + std::to_string(kMaxSize));
-    }
-    return {array[0].get<uint64_t>(), array[1].get<uint64_t>()};
-  }
-
-  Fields Object(const char* key) const { return {At(key), who_ + " '" + key + "'", path_}; }
-
- private:
-  [[noreturn]] void FailType(const char* key,
-                             const Json& value,
-                             const std::string& expected) const {
-    Fail(std::string("has '") + key + "' = " + Quote(value), expected);
-  }
-
-  static std::string Quote(const Json& value) {
-    if (value.is_structured()) {
-      return std::string("an ") + value.type_name() + " of " + std::to_string(value.size());
-    }
-    return Printable(value.dump());
-  }
-
-  const Json& object_;
-  std::string who_;
-  const std::filesystem::path& path_;
-};
-
-Camera ParseCamera(const Fields& fields, const std::array<uint64_t, 2>& size) {
+Camera ParseCamera(const JsonFields& fields, const std::array<uint64_t, 2>& size) {
   const std::string name = fields.String("model");
   const auto model = FindCameraModel(name);
   if (!model) fields.Fail("has model " + Printable(name), "a camera model of COLMAP 3.8");
@@ -111,13 +33,13 @@ Camera ParseCamera(const Fields& fields, const std::array<uint64_t, 2>& size) {
   return camera;
 }
 
-Rigid3d ParsePose(const Fields& fields) {
+Rigid3d ParsePose(const JsonFields& fields) {
   const std::vector<double> q = fields.Numbers("rotation_wxyz", 4);
   const std::vector<double> t = fields.Numbers("translation", 3);
   return {Eigen::Quaterniond(q[0], q[1], q[2], q[3]), Eigen::Vector3d(t[0], t[1], t[2])};
 }
 
-PixelMap ParsePixelMap(const Fields& fields, const char* key) {
+PixelMap ParsePixelMap(const JsonFields& fields, const char* key) {
   const Json& rows = fields.At(key);
   if (!rows.is_array() || rows.size() != 2) {
     fields.Fail(std::string("has no '") + key + "' of two rows", "[[a, b, c], [d, e, f]]");
@@ -133,8 +55,9 @@ PixelMap ParsePixelMap(const Fields& fields, const char* key) {
 PredictionsIndex::Entry ParseEntry(const Json& json,
                                    size_t idx,
                                    const std::filesystem::path& path) {
-  const std::string name = Fields(json, "view " + std::to_string(idx), path).String("name");
-  const Fields fields(json, "view '" + Printable(name) + "'", path);
+  const std::string name =
+      JsonFields(json, "view " + std::to_string(idx), path, kHint).String("name");
+  const JsonFields fields(json, "view '" + Printable(name) + "'", path, kHint);
   PredictionsIndex::Entry entry;
   entry.view.name = name;
   entry.view.camera = ParseCamera(fields.Object("camera"), fields.Size("original_size"));
@@ -152,17 +75,6 @@ PredictionsIndex::Entry ParseEntry(const Json& json,
   const std::string fault = FindFault(prediction);
   if (!fault.empty()) fields.Fail("cannot be used: " + fault, "a valid view");
   return entry;
-}
-
-Json ParseJson(std::string_view text, const std::filesystem::path& path) {
-  try {
-    return Json::parse(text);
-  } catch (const Json::exception& exception) {
-    Fail(path,
-         Printable(exception.what()),
-         "JSON, in which NaN and Infinity do not exist",
-         "write the predictions again");
-  }
 }
 
 Json ToJson(const PredictionsIndex::Entry& entry) {
@@ -186,14 +98,9 @@ Json ToJson(const PredictionsIndex::Entry& entry) {
 }  // namespace
 
 PredictionsIndex ParsePredictionsIndex(std::string_view text, const std::filesystem::path& path) {
-  const Json json = ParseJson(text, path);
-  const Fields fields(json, "the file", path);
-  const Json& format = fields.At("format");
-  const Json& version = fields.At("version");
-  if (format != kFormat || version != kVersion) {
-    fields.Fail("has format " + Printable(format.dump()) + ", version " + Printable(version.dump()),
-                std::string("format \"") + kFormat + "\", version " + std::to_string(kVersion));
-  }
+  const Json json = ParseJsonText(text, path, kHint);
+  const JsonFields fields(json, "the file", path, kHint);
+  fields.CheckFormat(kFormat, kVersion);
   PredictionsIndex index;
   index.producer = fields.String("producer");
   index.weights_hash = fields.String("weights_hash");

@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evaluation/cloud_error.h"
-#include "evaluation/icp.h"
-#include "evaluation/voxel_mean.h"
+#include "plugin/cloud_evaluation.h"
 #include "plugin/cloud_source.h"
 #include "plugin/commands.h"
 #include "plugin/table.h"
-#include "scene/error.h"
 
 #include <memory>
 
 namespace vgtw {
 namespace {
 
-using Points = std::vector<Eigen::Vector3d>;
 using nlohmann::json;
 
 json AsJson(const DirectedCloudError& error) {
@@ -29,61 +25,32 @@ json AsJson(const DirectedCloudError& error) {
 struct EvaluatePointsCommand {
   CloudSourceFlags sources;
   std::string icp = "none";
-  IcpOptions icp_options;
-  double voxel_size = 0.0;
-  CloudErrorOptions options;
+  CloudEvaluationOptions options;
   Usability usability;
 
-  struct Evaluation {
-    CloudAlignment alignment;
-    std::optional<IcpResult> icp;
+  struct Evaluation : CloudEvaluation {
     std::string filter_text;
     std::string reference_filter_text;
-    CloudError error;
   };
 
   void Run() {
     Apply(usability);
     sources.Resolve(usability.num_threads);
-    options.num_threads = icp_options.num_threads = usability.num_threads;
-    icp_options.with_scale = icp == "similarity";
-    options.Check();
-    icp_options.Check();
+    options.error.num_threads = options.icp.num_threads = usability.num_threads;
+    options.use_icp = icp != "none";
+    options.icp.with_scale = icp == "similarity";
+    options.error.Check();
+    options.icp.Check();
     CloudSource prediction(sources.input_path, sources.filter);
     CloudSource reference(sources.reference_path, sources.reference_filter);
-    Evaluation evaluation;
-    evaluation.alignment = AlignClouds(prediction, reference, sources.alignment);
-    Sim3d motion = evaluation.alignment.reference_from_prediction;
-    if (icp != "none") {
-      evaluation.icp = RefineByIcp(prediction, reference, motion);
-      motion = evaluation.icp->target_from_source;
-    }
-    evaluation.filter_text = prediction.FilterText();
-    evaluation.reference_filter_text = reference.FilterText();
-    evaluation.error = CompareClouds(
-        InVoxels(Moved(motion, prediction.Points())), InVoxels(reference.Points()), options);
+    const CloudAlignment alignment = AlignClouds(prediction, reference, sources.alignment);
+    const Evaluation evaluation{EvaluateClouds(prediction, reference, alignment, options),
+                                prediction.FilterText(),
+                                reference.FilterText()};
     json result = Json(evaluation);
     result["filter"] = prediction.FilterAsJson();
     result["reference_filter"] = reference.FilterAsJson();
     Finish(usability, Text(evaluation), result);
-  }
-
-  IcpResult RefineByIcp(CloudSource& prediction, CloudSource& reference, const Sim3d& guess) {
-    const PointTree source(prediction.Points(), usability.num_threads);
-    const PointTree target(reference.Points(), usability.num_threads);
-    const auto result = AlignByIcp(source, target, guess, icp_options);
-    if (!result) {
-      Fail(prediction.path(),
-           "has no points within " + FormatNumber(icp_options.max_distance, 4) +
-               " of the reference that determine a motion",
-           "clouds that nearly meet",
-           "give a larger --icp_distance or another --alignment");
-    }
-    return *result;
-  }
-
-  Points InVoxels(Points points) const {
-    return voxel_size != 0.0 ? MeanInVoxels(points, voxel_size) : points;
   }
 
   std::string Text(const Evaluation& evaluation) const {
@@ -96,7 +63,7 @@ struct EvaluatePointsCommand {
                                       FormatNumber(comp, digits),
                                       FormatNumber(both, digits)};
     };
-    const std::string f_distance = FormatNumber(options.f_distance, 4);
+    const std::string f_distance = FormatNumber(options.error.f_distance, 4);
     std::string text = FormatTable({
         {"", "accuracy", "completeness", "overall"},
         row("distance, mean", accuracy.mean, completeness.mean, error.Overall(), 5),
@@ -134,7 +101,7 @@ struct EvaluatePointsCommand {
                        AlignmentText(evaluation.alignment) + ", scale " +
                        FormatNumber(evaluation.alignment.reference_from_prediction.scale, 6);
     if (evaluation.icp) {
-      text += ", then " + icp + " ICP within " + FormatNumber(icp_options.max_distance, 4) + " (" +
+      text += ", then " + icp + " ICP within " + FormatNumber(options.icp.max_distance, 4) + " (" +
               std::to_string(evaluation.icp->num_iterations) + " iterations" +
               (evaluation.icp->converged ? "" : ", not converged") + ", RMSE " +
               FormatNumber(evaluation.icp->rmse, 5) + ", scale " +
@@ -142,16 +109,17 @@ struct EvaluatePointsCommand {
     }
     text += "\nprediction: " + evaluation.filter_text +
             "\nreference: " + evaluation.reference_filter_text + "\nvoxels: " +
-            (voxel_size > 0.0 ? "means in cubes of " + FormatNumber(voxel_size, 4) : "none") +
+            (options.voxel_size > 0.0 ? "means in cubes of " + FormatNumber(options.voxel_size, 4)
+                                      : "none") +
             "; clipping: ";
-    if (options.clip_distance > 0.0) {
-      text += "distances above " + FormatNumber(options.clip_distance, 4) + " count as that (" +
-              std::to_string(evaluation.error.accuracy.num_clipped) + " and " +
+    if (options.error.clip_distance > 0.0) {
+      text += "distances above " + FormatNumber(options.error.clip_distance, 4) +
+              " count as that (" + std::to_string(evaluation.error.accuracy.num_clipped) + " and " +
               std::to_string(evaluation.error.completeness.num_clipped) + " points)";
     } else {
       text += "none";
     }
-    return text + "; normals: " + std::to_string(options.num_normal_neighbours) +
+    return text + "; normals: " + std::to_string(options.error.num_normal_neighbours) +
            " nearest points, unsigned\n";
   }
 
@@ -159,10 +127,10 @@ struct EvaluatePointsCommand {
     const CloudError& error = evaluation.error;
     json result = {{"alignment", AsJson(evaluation.alignment)},
                    {"icp", nullptr},
-                   {"voxel_size", voxel_size},
-                   {"clip_distance", options.clip_distance},
-                   {"f_distance", options.f_distance},
-                   {"num_normal_neighbours", options.num_normal_neighbours},
+                   {"voxel_size", options.voxel_size},
+                   {"clip_distance", options.error.clip_distance},
+                   {"f_distance", options.error.f_distance},
+                   {"num_normal_neighbours", options.error.num_normal_neighbours},
                    {"accuracy", AsJson(error.accuracy)},
                    {"completeness", AsJson(error.completeness)},
                    {"overall", error.Overall()},
@@ -171,7 +139,7 @@ struct EvaluatePointsCommand {
                    {"normal_consistency_median", error.NormalConsistencyMedian()}};
     if (evaluation.icp) {
       result["icp"] = {{"kind", icp},
-                       {"max_distance", icp_options.max_distance},
+                       {"max_distance", options.icp.max_distance},
                        {"num_iterations", evaluation.icp->num_iterations},
                        {"converged", evaluation.icp->converged},
                        {"paired_percent", 100.0 * evaluation.icp->share_paired},
@@ -203,23 +171,23 @@ std::function<void()> DeclareEvaluatePoints(Flags& flags) {
                  "Then iterative closest points, point to point: rigid as Open3D does it, "
                  "similarity also finds the scale, from both directions")
       .Add("icp_distance",
-           &command->icp_options.max_distance,
+           &command->options.icp.max_distance,
            "Pairs farther apart do not count in ICP, scene units of the reference")
-      .Add("icp_iterations", &command->icp_options.max_iterations, "At most that many");
+      .Add("icp_iterations", &command->options.icp.max_iterations, "At most that many");
   AddFilterFlags(flags, command->sources);
   flags
       .Add("voxel_size",
-           &command->voxel_size,
+           &command->options.voxel_size,
            "Means in cubes of this edge instead of all points, scene units of the reference; 0 = "
            "none")
       .Add("clip_distance",
-           &command->options.clip_distance,
+           &command->options.error.clip_distance,
            "Larger distances count as this, scene units of the reference; 0 = none")
       .Add("f_distance",
-           &command->options.f_distance,
+           &command->options.error.f_distance,
            "Distance that is right for precision, recall and F, scene units of the reference")
       .Add("normal_neighbours",
-           &command->options.num_normal_neighbours,
+           &command->options.error.num_normal_neighbours,
            "Nearest points that a normal is taken from, the point itself among them");
   AddUsability(flags, command->usability);
   return [command] { command->Run(); };

@@ -115,6 +115,28 @@ const std::vector<Command>& Commands() {
        DeclareMaskScore,
        "  vgtw evaluate masks --mask_path masks/ --reference_mask_path truth/ --database_path "
        "a.db"},
+      {"protocol", "The paper's tables: photos, conditions, measuring, LaTeX"},
+      {"protocol make",
+       "A data set's folder -> protocol file: which photos, under which conditions",
+       DeclareProtocolMake,
+       "  vgtw protocol make --dataset robustnerf --input_path robustnerf/ --output_path "
+       "protocol.json\n"
+       "  vgtw protocol make --dataset folder --input_path scenes/ --num_images 8 --seed 1 "
+       "--output_path protocol.json"},
+      {"protocol photos",
+       "The protocol's photos in folders for any system, and the commands to run",
+       DeclareProtocolPhotos,
+       "  vgtw protocol photos --protocol_path protocol.json --output_path photos/"},
+      {"protocol tables",
+       "Predictions of systems and pseudo ground truth -> the paper's tables: JSON, CSV, LaTeX",
+       DeclareProtocolTables,
+       "  vgtw protocol tables --protocol_path protocol.json --reference_path reference/ --system "
+       "VGGT=vggt/ --system VGTW=vgtw/ --output_path tables/"},
+      {"protocol times",
+       "Seconds of a network for 5, 10 and 20 views, beside the paper's",
+       DeclareProtocolTimes,
+       "  vgtw protocol times --image_path photos/ --weights_path vgtw.safetensors --output_path "
+       "times/"},
       {"export",
        "Cameras, points and depths for other programs: PLY, PCD, glTF, transforms.json, TUM, KITTI, "
        "COLMAP",

@@ -67,7 +67,9 @@ DepthEvaluation EvaluateDepths(CloudSource& prediction,
   DepthEvaluation evaluation;
   DepthSource predicted_depth;
   if (options.reproject) {
-    evaluation.alignment = AlignClouds(prediction, reference, options.cloud_alignment);
+    evaluation.alignment = options.alignment
+                               ? *options.alignment
+                               : AlignClouds(prediction, reference, options.cloud_alignment);
     predicted_depth = FromCloud(
         prediction, evaluation.alignment->reference_from_prediction, options.cloud_of_all_views);
   } else {

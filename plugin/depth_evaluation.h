@@ -19,7 +19,8 @@ struct DepthEvaluationOptions {
   bool reproject = true;
   // Reprojection: the cloud of all views, or into each view its own points only.
   bool cloud_of_all_views = true;
-  std::string cloud_alignment = "auto";  // see AlignClouds
+  std::string cloud_alignment = "auto";          // see AlignClouds
+  std::optional<CloudAlignment> alignment = {};  // is used in place of that where it is given
   // Maps: how, and whether with one fit for all views in place of one for each.
   DepthAlignment depth_alignment = DepthAlignment::kMedian;
   bool one_fit = false;

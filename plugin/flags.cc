@@ -234,6 +234,13 @@ Flags& Flags::Add(std::string_view name, std::vector<int64_t>* value, std::strin
   return *this;
 }
 
+Flags& Flags::Add(std::string_view name, std::vector<std::string>* values, std::string_view help) {
+  impl_->app->add_option("--" + std::string(name), *values, std::string(help))
+      ->group(impl_->group)
+      ->take_all();
+  return *this;
+}
+
 Flags& Flags::Add(std::string_view name, uint64_t* value, std::string_view help) {
   AddOption(*impl_, name, value, help);
   return *this;

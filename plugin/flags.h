@@ -23,6 +23,8 @@ class Flags {
   Flags& Add(std::string_view name, int* value, std::string_view help);
   // "1,2,3"
   Flags& Add(std::string_view name, std::vector<int64_t>* value, std::string_view help);
+  // May be given several times.
+  Flags& Add(std::string_view name, std::vector<std::string>* values, std::string_view help);
   Flags& Add(std::string_view name, uint64_t* value, std::string_view help);
   Flags& Add(std::string_view name, double* value, std::string_view help);
   Flags& Add(std::string_view name, bool* value, std::string_view help);

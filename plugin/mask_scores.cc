@@ -2,6 +2,7 @@
 #include "plugin/mask_scores.h"
 
 #include "bridge/colmap_database.h"
+#include "bridge/mask_convert.h"
 #include "bridge/mask_files.h"
 #include "bridge/predictions.h"
 #include "scene/error.h"
@@ -92,11 +93,52 @@ FeatureSource FromDatabase(const fs::path& path) {
   };
 }
 
+// What the scored images are, and their true masks.
+struct TrueMasks {
+  std::vector<std::string> names;
+  std::function<StaticMask(size_t idx)> mask;  // may be called by several threads at once
+};
+
+TrueMasks InFolder(const MaskScoresOptions& options) {
+  TrueMasks truth;
+  truth.names = NamesOfMasks(options.reference_mask_path);
+  truth.mask = [&options, names = truth.names](size_t idx) {
+    const fs::path path = MaskPath(options.reference_mask_path, names[idx]);
+    if (options.image_path.empty()) return ReadStaticMask(path);
+    return ReadMaskOfSize(path, ReadImageSize(options.image_path / names[idx]));
+  };
+  return truth;
+}
+
+TrueMasks OfImages(const MaskScoresOptions& options) {
+  VGTW_CHECK(!options.image_path.empty(), "image_path belongs to image_names");
+  const MaskConvention& convention = GetMaskConvention(options.reference_convention);
+  const auto found = FindMasks(convention, options.reference_mask_path, options.image_names);
+  TrueMasks truth;
+  std::vector<std::vector<fs::path>> files;
+  for (size_t i = 0; i < found.size(); ++i) {
+    if (found[i].empty()) continue;
+    truth.names.push_back(options.image_names[i]);
+    files.push_back(found[i]);
+  }
+  if (files.empty()) {
+    Fail(options.reference_mask_path,
+         "has a true mask of none of " + std::to_string(options.image_names.size()) + " images",
+         "masks named as " + std::string(convention.tool) + " names them");
+  }
+  truth.mask = [&options, &convention, names = truth.names, files](size_t idx) {
+    const fs::path photo = options.image_path / names[idx];
+    return ReadMaskIn(convention, files[idx], photo, ReadImageSize(photo));
+  };
+  return truth;
+}
+
 }  // namespace
 
 std::vector<ImageMaskScore> ScoreMasks(const MaskScoresOptions& options,
                                        const ProgressCallback& progress) {
-  const std::vector<std::string> names = NamesOfMasks(options.reference_mask_path);
+  const TrueMasks true_masks = options.image_names.empty() ? InFolder(options) : OfImages(options);
+  const std::vector<std::string>& names = true_masks.names;
   if (options.predictions_path.empty()) {
     CheckMasksExist(options.mask_path, names, options.allow_missing_masks);
   }
@@ -107,10 +149,7 @@ std::vector<ImageMaskScore> ScoreMasks(const MaskScoresOptions& options,
   std::vector<ImageMaskScore> scores(names.size());
   const auto score_image = [&](int64_t i) {
     const std::string& name = names[static_cast<size_t>(i)];
-    const fs::path path = MaskPath(options.reference_mask_path, name);
-    const StaticMask truth = options.image_path.empty()
-                                 ? ReadStaticMask(path)
-                                 : ReadMaskOfSize(path, ReadImageSize(options.image_path / name));
+    const StaticMask truth = true_masks.mask(static_cast<size_t>(i));
     const double tolerance_px = options.tolerance_px != 0.0
                                     ? options.tolerance_px
                                     : DefaultBoundaryTolerancePx(truth.width(), truth.height());

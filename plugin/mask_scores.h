@@ -18,6 +18,10 @@ struct MaskScoresOptions {
   double threshold = 0.5;
   // True masks in COLMAP's naming; the images that have one are scored.
   std::filesystem::path reference_mask_path;
+  // Of these alone, in place of all below the folder; then `image_path` must be given, and the true
+  // masks may follow another convention (MaskConvention::id).
+  std::vector<std::string> image_names = {};
+  std::string reference_convention = "colmap";
   std::filesystem::path image_path;     // photos of which the true masks must have the size, or ""
   std::filesystem::path database_path;  // of features extracted without masks, or ""
   double tolerance_px = 0.0;            // of outlines, >= 0; 0 is DefaultBoundaryTolerancePx
