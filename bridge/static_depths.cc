@@ -54,9 +54,10 @@ RgbImage ReadPhotoOf(const View& view, const std::filesystem::path& image_folder
 
 Rgb ColorAt(const RgbImage& photo, const Eigen::Vector2d& pixel_in_original) {
   constexpr Rgb kGray = {128, 128, 128};
-  const auto x = static_cast<int>(pixel_in_original.x());
-  const auto y = static_cast<int>(pixel_in_original.y());
-  return photo.Contains(x, y) ? photo(x, y) : kGray;
+  const double x = pixel_in_original.x();
+  const double y = pixel_in_original.y();
+  if (!(x >= 0.0 && y >= 0.0 && x < photo.width() && y < photo.height())) return kGray;
+  return photo(static_cast<int>(x), static_cast<int>(y));
 }
 
 }  // namespace vgtw

@@ -44,7 +44,7 @@ double RelativeError(const SyntheticScene& scene, const Eigen::Vector3d& point) 
 }
 
 // COLMAP's fusion takes column and row of a pixel for its place, though its centre lies half a
-// pixel from there, so that its clouds are displaced by up to half a pixel, whatever the maps. With
+// pixel from there, so that its clouds are displaced by up to half a pixel. With
 // the principal points moved as far, it is exact, and what is left is the error of our maps.
 void ShiftByHalfAPixel(const std::filesystem::path& model_folder) {
   Reconstruction model = ReadModel(model_folder);
