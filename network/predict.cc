@@ -2,6 +2,7 @@
 #include "network/predict.h"
 
 #include "network/device.h"
+#include "network/plain_errors.h"
 #include "network/predict_run.h"
 #include "network/probe_run.h"
 #include "network/runtime.h"
@@ -13,10 +14,11 @@
 #include <utility>
 
 #include <ATen/ATen.h>
-#include <c10/util/Exception.h>
 
 namespace vgtw {
 namespace {
+
+constexpr char kMemoryAdvice[] = "; use a smaller --max_views or --max_memory";
 
 at::ScalarType ProductType(Precision precision, const at::Device& device) {
   if (precision == Precision::kFloat32) return at::kFloat;
@@ -27,19 +29,6 @@ at::ScalarType ProductType(Precision precision, const at::Device& device) {
 
 at::Tensor DescribeViews(const VisionTransformer& encoder, const at::Tensor& images) {
   return encoder(NormaliseImages(images)).to(at::kFloat).mean(1);
-}
-
-// LibTorch's messages are a line, then a stack.
-template <typename Work>
-auto WithPlainErrors(const Work& work) {
-  try {
-    return work();
-  } catch (const c10::Error& error) {
-    const std::string text = error.what_without_backtrace();
-    const bool is_memory = text.find("memory") != std::string::npos;
-    throw Error("LibTorch: " + text.substr(0, text.find('\n')) +
-                (is_memory ? "; use a smaller --max_views or --max_memory" : ""));
-  }
 }
 
 }  // namespace
@@ -72,7 +61,8 @@ Predictor::Predictor(const std::vector<std::filesystem::path>& weights,
   load.num_threads = options.num_threads;
   // Loading converts types, which is LibTorch's work.
   UseThreads(options.num_threads);
-  impl_.reset(new Impl{options, WithPlainErrors([&] { return LoadNetwork(weights, load); }), {}});
+  impl_.reset(new Impl{
+      options, WithPlainErrors([&] { return LoadNetwork(weights, load); }, kMemoryAdvice), {}});
   const LoadedNetwork& loaded = impl_->loaded;
   ReadyNetwork& network = impl_->network;
   network.model = loaded.model.get();
@@ -101,19 +91,24 @@ PredictSummary Predictor::Run(const std::filesystem::path& image_folder,
                               const std::vector<std::string>& image_names,
                               const std::function<void(const ViewPrediction&)>& on_prediction,
                               const ProgressCallback& progress) const {
-  return WithPlainErrors([&] {
-    return PredictViews(
-        impl_->network, impl_->options, image_folder, image_names, on_prediction, progress);
-  });
+  return WithPlainErrors(
+      [&] {
+        return PredictViews(
+            impl_->network, impl_->options, image_folder, image_names, on_prediction, progress);
+      },
+      kMemoryAdvice);
 }
 
 ProbeSummary Predictor::Probe(const std::filesystem::path& image_folder,
                               const std::vector<std::string>& image_names,
                               const ProbeRequest& request,
                               const ProgressCallback& progress) const {
-  return WithPlainErrors([&] {
-    return ProbeViews(impl_->network, impl_->options, image_folder, image_names, request, progress);
-  });
+  return WithPlainErrors(
+      [&] {
+        return ProbeViews(
+            impl_->network, impl_->options, image_folder, image_names, request, progress);
+      },
+      kMemoryAdvice);
 }
 
 }  // namespace vgtw

@@ -3,6 +3,7 @@
 
 #include "network/device.h"
 #include "network/folder_samples.h"
+#include "network/plain_errors.h"
 #include "network/runtime.h"
 #include "network/scene_samples.h"
 #include "network/training_loss.h"
@@ -33,6 +34,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
+
+constexpr char kStateFile[] = "state.safetensors";
+constexpr char kLogFile[] = "log.jsonl";
+constexpr char kWeightsFile[] = "weights.safetensors";
 
 // Keys of random choices that must not depend on each other.
 constexpr uint64_t kValidationKey = 1;
@@ -181,12 +186,12 @@ class TrainRun {
 
   TrainSummary Run(const ProgressCallback& progress) {
     const Clock::time_point start = Clock::now();
-    const fs::path state_path = output_path_ / "state.safetensors";
+    const fs::path state_path = output_path_ / kStateFile;
     const std::string identity = IdentityOf(options_);
     int64_t step =
         ReadTrainingState(state_path, identity, parameters_, optimiser_.moments()).value_or(0);
-    CutLog(output_path_ / "log.jsonl", step);
-    log_.open(output_path_ / "log.jsonl", std::ios::app);
+    CutLog(output_path_ / kLogFile, step);
+    log_.open(output_path_ / kLogFile, std::ios::app);
     Clock::time_point last_save = Clock::now();
     const auto save = [&] {
       WriteTrainingState(state_path, parameters_, optimiser_.moments(), step, identity);
@@ -201,7 +206,7 @@ class TrainRun {
     }
     save();
     WriteTrainedWeights(
-        output_path_ / "weights.safetensors", start_.network, parameters_, optimiser_.moments());
+        output_path_ / kWeightsFile, start_.network, parameters_, optimiser_.moments());
     summary_.num_steps = step;
     summary_.num_trained = parameters_.NumTrained();
     summary_.seconds = SecondsSince(start);
@@ -294,7 +299,7 @@ class TrainRun {
 
   void Log(const nlohmann::json& entry) {
     log_ << entry.dump() << std::endl;
-    if (!log_) throw Error("cannot write " + (output_path_ / "log.jsonl").string());
+    if (!log_) throw Error("cannot write " + (output_path_ / kLogFile).string());
   }
 
   const TrainOptions& options_;
@@ -318,8 +323,19 @@ TrainSummary Train(const TrainOptions& options,
                    const ProgressCallback& progress) {
   options.Check();
   UseThreads(options.num_threads);
-  fs::create_directories(output_path);
-  return TrainRun(options, output_path).Run(progress);
+  std::error_code error;
+  fs::create_directories(output_path, error);
+  if (error) Fail(output_path, "cannot be made (" + error.message() + ")", "a folder for the run");
+  return WithPlainErrors([&] { return TrainRun(options, output_path).Run(progress); },
+                         "; use fewer --max_views, a smaller --width or --recompute 1");
+}
+
+void ForgetRun(const fs::path& output_path) {
+  for (const char* name : {kStateFile, kLogFile, kWeightsFile}) {
+    std::error_code error;
+    fs::remove(output_path / name, error);
+    if (error) Fail(output_path / name, "cannot be removed (" + error.message() + ")", "a file");
+  }
 }
 
 }  // namespace vgtw

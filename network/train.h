@@ -116,4 +116,7 @@ TrainSummary Train(const TrainOptions& options,
                    const std::filesystem::path& output_path,
                    const ProgressCallback& progress = {});
 
+// Removes what a run left in `output_path`, and nothing else that lies there.
+void ForgetRun(const std::filesystem::path& output_path);
+
 }  // namespace vgtw

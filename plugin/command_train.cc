@@ -113,7 +113,7 @@ struct TrainCommand {
   void Run() {
     Apply(usability);
     const TrainOptions resolved = Options();
-    if (overwrite) fs::remove_all(output_path);
+    if (overwrite) ForgetRun(output_path);
     TrainSummary summary;
     {
       ProgressDisplay display("steps");
