@@ -76,12 +76,11 @@ struct ProtocolTablesCommand {
     AtomicFolder folder(output_path, overwrite);
     Score();
     const std::vector<ResultTable> tables = MakeTables(protocol, scores);
-    const std::string conditions = Conditions();
-    WriteTableFiles(folder.path(), tables, conditions);
-    const json result = Json(tables, conditions);
+    WriteTableFiles(folder.path(), tables);
+    const json result = Json(tables);
     WriteFileAtomically(folder.path() / "tables.json", result.dump(1) + "\n");
     folder.Commit();
-    Finish(usability, Text(tables, conditions), result);
+    Finish(usability, Text(tables), result);
   }
 
   void ReadSystems() {
@@ -164,14 +163,7 @@ struct ProtocolTablesCommand {
     }
   }
 
-  std::string Conditions() const {
-    const ProtocolSampling& sampling = protocol.sampling;
-    return "up to " + std::to_string(sampling.num_images) + " " + sampling.test_images +
-           " photos per scene (seed " + std::to_string(sampling.seed) +
-           "); distances in scene units of the reference, " + ConditionsText(protocol.conditions);
-  }
-
-  json Json(const std::vector<ResultTable>& tables, const std::string& conditions) const {
+  json Json(const std::vector<ResultTable>& tables) const {
     json tables_json = json::array();
     for (const ResultTable& table : tables) tables_json.push_back(AsJson(table));
     return {{"format", "vgtw-tables"},
@@ -180,7 +172,6 @@ struct ProtocolTablesCommand {
             {"protocol_path", protocol_path.string()},
             {"protocol_hash", HashFile(protocol_path)},
             {"protocol", json::parse(ReadFile(protocol_path))},
-            {"conditions", conditions},
             {"references", references},
             {"predictions", predictions},
             {"scores", ScoresAsJson(scores)},
@@ -188,8 +179,12 @@ struct ProtocolTablesCommand {
             {"warnings", warnings}};
   }
 
-  std::string Text(const std::vector<ResultTable>& tables, const std::string& conditions) const {
-    std::string text = ScoresText(protocol, scores) + conditions + "\n";
+  std::string Text(const std::vector<ResultTable>& tables) const {
+    const ProtocolConditions& conditions = protocol.conditions;
+    std::string text = ScoresText(protocol, scores) + SamplingText(protocol.sampling) +
+                       "\npoints: " + ConditionsText(conditions, TablePart::kPoints) +
+                       "\ndepth: " + ConditionsText(conditions, TablePart::kDepth) +
+                       "\nposes: " + ConditionsText(conditions, TablePart::kPoses) + "\n";
     for (const auto& [scene, identity] : references.items()) {
       text += "reference of " + scene + ": " + identity.value("producer", "not predicted") +
               ", weights " + identity.value("weights_hash", "").substr(0, 12) + ", files " +

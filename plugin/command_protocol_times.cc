@@ -11,8 +11,8 @@
 #include "scene/files.h"
 
 #include <cmath>
+#include <fstream>
 #include <memory>
-#include <sstream>
 
 namespace vgtw {
 namespace {
@@ -21,8 +21,8 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 std::string CpuName() {
-  std::istringstream lines(ReadFile("/proc/cpuinfo"));
-  for (std::string line; std::getline(lines, line);) {
+  std::ifstream cpuinfo("/proc/cpuinfo");
+  for (std::string line; std::getline(cpuinfo, line);) {
     const size_t colon = line.find(':');
     if (line.starts_with("model name") && colon + 2 < line.size()) return line.substr(colon + 2);
   }
@@ -57,12 +57,13 @@ struct ProtocolTimesCommand {
     ProgressDisplay display("runs");
     const std::vector<NetworkTime> times = MeasureNetwork(options, display.Callback());
     fs::remove_all(options.scratch);
-    const ResultTable table = Table(times);
-    WriteTableFiles(folder.path(), {table}, Conditions(machine));
+    ResultTable table = Table(times);
+    table.conditions = Conditions(machine);
+    WriteTableFiles(folder.path(), {table});
     const json result = Json(table, times, machine);
     WriteFileAtomically(folder.path() / "times.json", result.dump(1) + "\n");
     folder.Commit();
-    Finish(usability, Text(table, times, machine), result);
+    Finish(usability, Text(table, times), result);
   }
 
   void SetFlags() {
@@ -116,16 +117,14 @@ struct ProtocolTimesCommand {
     return table;
   }
 
-  std::string Text(const ResultTable& table,
-                   const std::vector<NetworkTime>& times,
-                   const std::string& machine) const {
+  std::string Text(const ResultTable& table, const std::vector<NetworkTime>& times) const {
     std::vector<std::vector<std::string>> rows = {{"seconds"}};
     for (const TableGroup& group : table.groups) rows[0].push_back(group.heads.front());
     for (const TableRow& row : table.rows) {
       rows.push_back({row.system + (row.is_published ? " (paper, its own GPU)" : "")});
       for (const double value : row.values) rows.back().push_back(FormatNumber(value, 2));
     }
-    std::string text = FormatTable(rows) + Conditions(machine) + "\n";
+    std::string text = FormatTable(rows) + table.conditions + "\n";
     if (times.size() < options.num_views.size()) {
       text += "warning: too few photos in " + options.image_path.string() + " for some columns\n";
     }

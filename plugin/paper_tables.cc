@@ -38,6 +38,7 @@ void CheckRows(const ResultTable& table) {
 ResultTable TableOf(const json& object) {
   ResultTable table{.name = object.at("name"),
                     .title = object.at("title"),
+                    .conditions = "",
                     .groups = {},
                     .metrics = {},
                     .rows = {}};
@@ -56,6 +57,7 @@ ResultTable TableOf(const json& object) {
 ResultTable TimesOf(const json& object) {
   ResultTable table{.name = "times",
                     .title = "Seconds of one pass of the network",
+                    .conditions = "",
                     .groups = {},
                     .metrics = {{"seconds", "s", /*is_lower_better=*/true, /*digits=*/2}},
                     .rows = {}};

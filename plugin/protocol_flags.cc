@@ -4,6 +4,36 @@
 #include "plugin/table.h"
 
 namespace vgtw {
+namespace {
+
+std::string FilterText(const ProtocolConditions& conditions) {
+  return FormatNumber(conditions.keep_percent, 0) + " % most confident of " +
+         (conditions.keep_scope == "all" ? "all views" : "each view") + " " +
+         conditions.keep_order + " the distractor test at " +
+         FormatNumber(conditions.mask_threshold, 2) + ", of the reference " +
+         FormatNumber(conditions.reference_keep_percent, 0) + " %";
+}
+
+std::string CloudText(const ProtocolConditions& conditions) {
+  std::string text = conditions.alignment == "none"
+                         ? "prediction not aligned"
+                         : "prediction Sim3-aligned (Umeyama) on " + conditions.alignment;
+  if (conditions.icp != "none") {
+    text += ", then " + conditions.icp + " ICP within " + FormatNumber(conditions.icp_distance, 3);
+  }
+  return text + "; " + FilterText(conditions);
+}
+
+std::string DepthText(const ProtocolConditions& conditions) {
+  if (conditions.depth_method == "maps") {
+    return "depth maps aligned by " + conditions.depth_alignment + ", " + FilterText(conditions);
+  }
+  return CloudText(conditions) + "; points of " +
+         (conditions.depth_cloud == "all" ? "all views" : "each view") +
+         " projected into the reference's views";
+}
+
+}  // namespace
 
 void AddConditionFlags(Flags& flags, ProtocolConditions& conditions) {
   flags.Group("Conditions")
@@ -64,27 +94,29 @@ void AddConditionFlags(Flags& flags, ProtocolConditions& conditions) {
            "Step from the first to the second view of a pair of the RPE, in the order of names");
 }
 
-std::string ConditionsText(const ProtocolConditions& conditions) {
-  std::string text =
-      "prediction " + (conditions.alignment == "none" ? std::string("not aligned")
-                                                      : "Sim3-aligned on " + conditions.alignment);
-  if (conditions.icp != "none") {
-    text += ", then " + conditions.icp + " ICP within " + FormatNumber(conditions.icp_distance, 3);
+std::string SamplingText(const ProtocolSampling& sampling) {
+  return "up to " + std::to_string(sampling.num_images) + " " + sampling.test_images +
+         " photos per scene, drawn by seed " + std::to_string(sampling.seed);
+}
+
+std::string ConditionsText(const ProtocolConditions& conditions, TablePart part) {
+  switch (part) {
+    case TablePart::kPoints:
+      return "distances in scene units of the reference, " + CloudText(conditions) +
+             "; normals of " + std::to_string(conditions.num_normal_neighbours) + " neighbours";
+    case TablePart::kDepth:
+      return DepthText(conditions) + ", mean over " + conditions.depth_mean;
+    case TablePart::kPoses:
+      return "RMSE in scene units of the reference and degrees, " +
+             (conditions.pose_alignment == "none" ? "not aligned"
+                                                  : conditions.pose_alignment + "-aligned") +
+             "; RPE over " + std::to_string(conditions.rpe_delta) +
+             (conditions.rpe_delta == 1 ? " step" : " steps") + " in the order of names";
+    case TablePart::kMasks:
+      break;
   }
-  text += "; " + FormatNumber(conditions.keep_percent, 0) + " % most confident of " +
-          (conditions.keep_scope == "all" ? "all views" : "each view") + " " +
-          conditions.keep_order + " the distractor test at " +
-          FormatNumber(conditions.mask_threshold, 2) + ", reference " +
-          FormatNumber(conditions.reference_keep_percent, 0) + " %; normals of " +
-          std::to_string(conditions.num_normal_neighbours) + " neighbours; depth by " +
-          conditions.depth_method;
-  text += conditions.depth_method == "maps" ? " (" + conditions.depth_alignment + ")"
-                                            : " of " + conditions.depth_cloud + " points";
-  return text + ", mean over " + conditions.depth_mean + "; poses " +
-         (conditions.pose_alignment == "none" ? "not aligned"
-                                              : conditions.pose_alignment + "-aligned") +
-         ", RPE over " + std::to_string(conditions.rpe_delta) +
-         (conditions.rpe_delta == 1 ? " step" : " steps") + " in the order of names";
+  return "distractor probability from " + FormatNumber(conditions.mask_threshold, 2) +
+         ", means over images";
 }
 
 }  // namespace vgtw

@@ -10,7 +10,9 @@ namespace vgtw {
 
 void AddConditionFlags(Flags& flags, ProtocolConditions& conditions);
 
-// What the numbers hold under, in one line: "prediction Sim3-aligned on ...".
-std::string ConditionsText(const ProtocolConditions& conditions);
+// What numbers hold under, for captions: of the drawn photos and of one part of the tables.
+enum class TablePart { kPoints, kDepth, kPoses, kMasks };
+std::string SamplingText(const ProtocolSampling& sampling);
+std::string ConditionsText(const ProtocolConditions& conditions, TablePart part);
 
 }  // namespace vgtw

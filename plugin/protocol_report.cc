@@ -16,28 +16,15 @@ using nlohmann::json;
 constexpr std::array<std::string_view, 9> kTextMetrics = {
     "acc", "comp", "nc", "overall", "abs_rel", "delta", "rpe_trans", "rpe_rot", "ate"};
 
-std::string Caption(const ResultTable& table, const std::string& conditions) {
-  std::string caption = table.title + ". " + conditions + ".";
-  for (const TableRow& row : table.rows) {
-    if (!row.is_published) continue;
-    return caption +
-           " Rows marked (paper) are published numbers, in units of a reference of their own.";
-  }
-  return caption;
-}
-
 }  // namespace
 
-void WriteTableFiles(const std::filesystem::path& folder,
-                     const std::vector<ResultTable>& tables,
-                     const std::string& conditions) {
+void WriteTableFiles(const std::filesystem::path& folder, const std::vector<ResultTable>& tables) {
   std::string all =
       "\\documentclass{article}\n\\usepackage{amsmath}\n\\usepackage{booktabs}\n"
       "\\usepackage{graphicx}\n\\usepackage[margin=2cm]{geometry}\n\\begin{document}\n";
   for (const ResultTable& table : tables) {
     WriteFileAtomically(folder / (table.name + ".csv"), FormatCsv(table));
-    WriteFileAtomically(folder / (table.name + ".tex"),
-                        FormatLatex(table, Caption(table, conditions)));
+    WriteFileAtomically(folder / (table.name + ".tex"), FormatLatex(table));
     all += "\\input{" + table.name + "}\n";
   }
   WriteFileAtomically(folder / "all_tables.tex", all + "\\end{document}\n");
@@ -77,6 +64,7 @@ json AsJson(const ResultTable& table) {
   }
   return {{"name", table.name},
           {"title", table.title},
+          {"conditions", table.conditions},
           {"columns", std::move(columns)},
           {"rows", std::move(rows)}};
 }

@@ -13,11 +13,8 @@
 
 namespace vgtw {
 
-// Per table <name>.csv and <name>.tex, and all_tables.tex, which typesets all of them. `conditions`
-// goes into every caption.
-void WriteTableFiles(const std::filesystem::path& folder,
-                     const std::vector<ResultTable>& tables,
-                     const std::string& conditions);
+// Per table <name>.csv and <name>.tex, and all_tables.tex, which typesets all of them.
+void WriteTableFiles(const std::filesystem::path& folder, const std::vector<ResultTable>& tables);
 
 // Scores of every system and scene with their conditions; null where none was measured.
 nlohmann::json ScoresAsJson(const std::vector<SystemScores>& systems);

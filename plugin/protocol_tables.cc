@@ -2,6 +2,7 @@
 #include "plugin/protocol_tables.h"
 
 #include "plugin/paper_tables.h"
+#include "plugin/protocol_flags.h"
 
 #include <algorithm>
 #include <array>
@@ -36,6 +37,13 @@ bool IsOfPaper(const Protocol& protocol) {
 }
 
 bool IsOfMasks(const ResultTable& table) { return table.metrics.front().key.starts_with("mask_"); }
+
+TablePart PartOf(const ResultTable& table) {
+  const std::string& metric = table.metrics.front().key;
+  if (IsOfMasks(table)) return TablePart::kMasks;
+  if (metric == "abs_rel") return TablePart::kDepth;
+  return metric == "rpe_trans" ? TablePart::kPoses : TablePart::kPoints;
+}
 
 double ValueOf(const SystemScores& system,
                const std::vector<std::string>& scenes,
@@ -89,8 +97,12 @@ ResultTable Restricted(const ResultTable& table, const std::set<std::string>& sc
 }
 
 ResultTable GenericTable(const Family& family, const std::vector<const ProtocolScene*>& scenes) {
-  ResultTable table{
-      .name = family.name, .title = family.title, .groups = {}, .metrics = {}, .rows = {}};
+  ResultTable table{.name = family.name,
+                    .title = family.title,
+                    .conditions = "",
+                    .groups = {},
+                    .metrics = {},
+                    .rows = {}};
   std::vector<std::string> names;
   for (const ProtocolScene* scene : scenes) {
     table.groups.push_back({{scene->title}, {scene->name}});
@@ -148,7 +160,11 @@ std::vector<ResultTable> MakeTables(const Protocol& protocol,
     others.push_back(std::move(table));
   }
   tables.insert(tables.end(), others.begin(), others.end());
-  for (ResultTable& table : tables) AddSystems(systems, table);
+  for (ResultTable& table : tables) {
+    table.conditions = "Measured on " + SamplingText(protocol.sampling) + "; " +
+                       ConditionsText(protocol.conditions, PartOf(table));
+    AddSystems(systems, table);
+  }
   return tables;
 }
 

@@ -121,6 +121,17 @@ std::string LatexBody(const ResultTable& table) {
   return text;
 }
 
+std::string Caption(const ResultTable& table) {
+  std::string caption = table.title + ".";
+  if (!table.conditions.empty()) caption += " " + table.conditions + ".";
+  if (std::any_of(table.rows.begin(), table.rows.end(), [](const TableRow& row) {
+        return row.is_published;
+      })) {
+    caption += " Rows marked (paper) are published numbers, measured elsewhere.";
+  }
+  return EscapedForLatex(caption);
+}
+
 }  // namespace
 
 std::string EscapedForLatex(const std::string& text) {
@@ -171,8 +182,8 @@ std::string FormatCsv(const ResultTable& table) {
   return text;
 }
 
-std::string FormatLatex(const ResultTable& table, const std::string& caption) {
-  std::string text = "\\begin{table}[htbp]\n\\centering\n\\caption{" + EscapedForLatex(caption) +
+std::string FormatLatex(const ResultTable& table) {
+  std::string text = "\\begin{table}[htbp]\n\\centering\n\\caption{" + Caption(table) +
                      "}\n\\label{tab:" + table.name + "}\n" +
                      "\\resizebox{\\ifdim\\width>\\textwidth\\textwidth\\else\\width\\fi}{!}{%\n" +
                      "\\begin{tabular}{" + LatexColumns(table) + "}\n\\toprule\n";

@@ -29,6 +29,7 @@ struct TableRow {
 struct ResultTable {
   std::string name;  // of its files
   std::string title;
+  std::string conditions;  // that the measured numbers hold under, for the caption
   std::vector<TableGroup> groups;
   std::vector<TableMetric> metrics;
   std::vector<TableRow> rows;
@@ -40,8 +41,7 @@ std::string FormatCsv(const ResultTable& table);
 
 // A table environment (needs booktabs and graphicx) of rounded values, "-" = none: measured rows,
 // then the paper's, which are marked. The best of either kind is bold, with all that print alike.
-// `caption` is plain text.
-std::string FormatLatex(const ResultTable& table, const std::string& caption);
+std::string FormatLatex(const ResultTable& table);
 
 // Plain text with what LaTeX would take for its own replaced.
 std::string EscapedForLatex(const std::string& text);

@@ -44,7 +44,9 @@ class ProtocolCommand : public testing::Test {
     return options;
   }
 
-  ProtocolCommand() : synthetic_(Options()), truth_(MakeTruePrediction(synthetic_, 56)) {}
+  ProtocolCommand() : synthetic_(Options()), truth_(MakeTruePrediction(synthetic_, 56)) {
+    for (size_t i = 0; i < kNumViews; ++i) rendered_.push_back(synthetic_.Render(i));
+  }
 
   // As Sabour et al. name photos; one view in three has distractors.
   static std::string RobustNerfName(size_t i) {
@@ -57,8 +59,7 @@ class ProtocolCommand : public testing::Test {
     for (const std::string& scene : kRobustNerf) {
       const std::string folder = scene == "crab1" ? "crab (1)" : scene;
       for (size_t i = 0; i < kNumViews; ++i) {
-        WriteImage(folder_ / "data" / folder / "images" / RobustNerfName(i),
-                   synthetic_.Render(i).image);
+        WriteImage(folder_ / "data" / folder / "images" / RobustNerfName(i), rendered_[i].image);
       }
     }
   }
@@ -70,9 +71,8 @@ class ProtocolCommand : public testing::Test {
     for (const std::string& scene : kOnTheGo) {
       const fs::path folder = folder_ / "data" / scene;
       for (size_t i = 0; i < kNumViews; ++i) {
-        const SyntheticView view = synthetic_.Render(i);
-        WriteImage(folder / "images" / OnTheGoName(i), view.image);
-        if (scene == "corner") WriteTrueMask(OnTheGoName(i), view.distractor);
+        WriteImage(folder / "images" / OnTheGoName(i), rendered_[i].image);
+        if (scene == "corner") WriteTrueMask(OnTheGoName(i), rendered_[i].distractor);
       }
       WriteFileAtomically(folder / "transforms.json", TransformsJson(views, "images"));
       WriteFileAtomically(folder / "split.json",
@@ -196,6 +196,7 @@ class ProtocolCommand : public testing::Test {
   const TemporaryFolder folder_;
   const SyntheticScene synthetic_;
   const Prediction truth_;
+  std::vector<SyntheticView> rendered_;
 };
 
 TEST_F(ProtocolCommand, NumbersAreThoseOfEvaluate) {

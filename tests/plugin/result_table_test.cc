@@ -15,6 +15,7 @@ ResultTable SampleTable() {
   ResultTable table;
   table.name = "points";
   table.title = "Points";
+  table.conditions = "50 % of a_b";
   table.groups = {{{"Low", "A"}, {"a"}},
                   {{"Low", "B"}, {"b"}},
                   {{"High", "C"}, {"c"}},
@@ -28,7 +29,7 @@ ResultTable SampleTable() {
 }
 
 TEST(FormatLatex, HeadsSpanTheirColumns) {
-  const std::string latex = FormatLatex(SampleTable(), "50 % of a_b");
+  const std::string latex = FormatLatex(SampleTable());
   EXPECT_THAT(latex, HasSubstr("\\begin{tabular}{l|cc|cc|cc|cc}\n"));
   EXPECT_THAT(latex,
               HasSubstr(" & \\multicolumn{4}{c}{Low} & \\multicolumn{2}{c}{High} & "
@@ -38,11 +39,11 @@ TEST(FormatLatex, HeadsSpanTheirColumns) {
               HasSubstr(" & \\multicolumn{2}{c}{A} & \\multicolumn{2}{c}{B} & "
                         "\\multicolumn{2}{c}{C} & \\multicolumn{2}{c}{} \\\\\n"
                         "\\cmidrule(lr){2-3} \\cmidrule(lr){4-5} \\cmidrule(lr){6-7}\n"));
-  EXPECT_THAT(latex, HasSubstr("\\caption{50 \\% of a\\_b}"));
+  EXPECT_THAT(latex, HasSubstr("\\caption{Points. 50 \\% of a\\_b. Rows marked (paper) are"));
 }
 
 TEST(FormatLatex, BestOfEitherKindIsBoldWithItsEquals) {
-  const std::string latex = FormatLatex(SampleTable(), "");
+  const std::string latex = FormatLatex(SampleTable());
   // 0.104 and 0.096 both print as 0.10; what was not measured is a dash.
   EXPECT_THAT(latex,
               HasSubstr("one & \\textbf{0.10} & 0.50 & \\textbf{0.20} & - & \\textbf{0.30} & "
