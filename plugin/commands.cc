@@ -138,7 +138,8 @@ const std::vector<Command>& Commands() {
        "  vgtw protocol times --image_path photos/ --weights_path vgtw.safetensors --output_path "
        "times/"},
       {"export",
-       "Cameras, points and depths for other programs: PLY, PCD, glTF, transforms.json, TUM, KITTI, "
+       "Cameras, points and depths for other programs: PLY, PCD, glTF, transforms.json, TUM, "
+       "KITTI, "
        "COLMAP",
        DeclareExport,
        "  vgtw export --input_path out/sparse/refined --format transforms --output_path "
