@@ -82,6 +82,27 @@ TEST_F(ScoreMasksTest, CountsTheFeaturesOfADatabase) {
   EXPECT_EQ(features.num_static_lost, 1u);
 }
 
+// Label images as DAVIS has them: 0 is the background, any colour a distractor.
+TEST_F(ScoreMasksTest, ScoresNamedImagesByTheMasksOfAnotherConvention) {
+  RgbImage labels(40, 20, Rgb{0, 0, 0});
+  for (int y = 0; y < 20; ++y) std::fill_n(&labels(0, y), 10, Rgb{0, 0, 128});
+  WriteImage(folder_ / "labels/a.png", labels);
+  WriteImage(folder_ / "labels/c.png", labels);
+  WriteImage(folder_ / "photos/a.jpg", RgbImage(40, 20, Rgb{9, 9, 9}));
+  options_.reference_mask_path = folder_ / "labels";
+  options_.reference_convention = "sam2";
+  options_.image_path = folder_ / "photos";
+  options_.image_names = {"a.jpg", "without_labels.jpg"};
+  const auto scores = ScoreMasks(options_);
+  ASSERT_EQ(scores.size(), 1u);
+  EXPECT_EQ(scores[0].name, "a.jpg");
+  EXPECT_EQ(scores[0].score.pixels.true_positive, 200u);
+  EXPECT_EQ(scores[0].score.pixels.false_positive, 200u);
+  EXPECT_EQ(scores[0].score.pixels.false_negative, 0u);
+  options_.image_names = {"without_labels.jpg"};
+  EXPECT_THAT(ErrorOfScoring(), HasSubstr("has a true mask of none of 1 images"));
+}
+
 TEST_F(ScoreMasksTest, AnImageThatTheDatabaseLacksIsAnError) {
   WriteDatabase("c.png");
   options_.database_path = folder_ / "a.db";
