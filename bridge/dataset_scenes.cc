@@ -156,6 +156,11 @@ fs::path PosesOf(const fs::path& root, const fs::path& folder) {
   return {};
 }
 
+// Masks in COLMAP's naming, beside the photos' folder.
+fs::path MasksOf(const fs::path& root, const fs::path& folder) {
+  return fs::is_directory(root / folder / "masks") ? folder / "masks" : fs::path();
+}
+
 DatasetScan ScanKnown(const fs::path& root,
                       std::span<const KnownScene> known_scenes,
                       const std::string& image_folder) {
@@ -182,6 +187,7 @@ DatasetScan ScanKnown(const fs::path& root,
     const fs::path folder = found->second;
     DatasetScene scene{.name = known.name, .title = known.title, .group = known.group};
     scene.image_path = folder / ImageFolderOf(root / folder, image_folder);
+    scene.mask_path = MasksOf(root, folder);
     scene.pose_path = PosesOf(root, folder);
     if (fs::exists(root / folder / "split.json")) {
       SplitByFile(root, folder, scene);
@@ -236,6 +242,7 @@ DatasetScan ScanFolders(const fs::path& root, std::string_view prefix) {
     }
     DatasetScene scene{.name = folder, .title = folder, .group = ""};
     scene.image_path = photos->empty() ? fs::path(folder) : folder / *photos;
+    if (!photos->empty()) scene.mask_path = MasksOf(root, folder);
     scene.pose_path = PosesOf(root, folder);
     SplitByNames(root, /*is_clean_without_word=*/true, scene);
     scan.scenes.push_back(std::move(scene));
@@ -255,6 +262,7 @@ std::optional<DatasetScene> ScanOne(const fs::path& root) {
   DatasetScene scene;
   scene.name = scene.title = named.filename().string();
   scene.image_path = is_flat ? "." : "images";
+  if (!is_flat) scene.mask_path = MasksOf(root, "");
   scene.pose_path = PosesOf(root, "");
   SplitByNames(root, /*is_clean_without_word=*/true, scene);
   return scene;

@@ -18,6 +18,7 @@ namespace vgtw {
 //   davis       JPEGImages/<resolution>/<sequence>/, Annotations/<resolution>/<sequence>/
 //   folder      photos in it are one scene, else every folder in it that holds photos (or images/)
 //               is; photos are clean unless their names say clutter
+// Beside images/ there may be true masks in masks/, as COLMAP has them (not in davis).
 enum class DatasetKind { kRobustNerf, kOnTheGo, kDtu, kDavis, kFolder };
 
 // The words above, in this order, and back. Throws std::invalid_argument for another word.

@@ -85,6 +85,7 @@ struct ProtocolMakeCommand {
                 std::to_string(scene.test_images.size()) + " such photos\n";
       }
     }
+    for (const ProtocolScene& scene : protocol.scenes) text += AlignmentWarning(scene);
     return text + "written: " + output_path.string() + "\nNext: " +
            ShellLine("vgtw",
                      {"protocol",
@@ -94,6 +95,23 @@ struct ProtocolMakeCommand {
                       "--output_path",
                       "photos/"}) +
            "\n";
+  }
+
+  // What will be a dash in tables for want of something to align on.
+  std::string AlignmentWarning(const ProtocolScene& scene) const {
+    const std::string& alignment = protocol.conditions.alignment;
+    const std::string warning = "warning: scene " + scene.name + " has ";
+    if (scene.clean_images.empty()) {
+      return warning + "no clean photos: points and depth need another reference\n";
+    }
+    if (alignment == "dataset_cameras" && scene.pose_reference_path.empty()) {
+      return warning + "no poses of the data set for --alignment dataset_cameras\n";
+    }
+    if (alignment != "dataset_cameras" && alignment != "none" && NumShared(scene) == 0) {
+      return warning + "no test image among its clean ones: --alignment " + alignment +
+             " finds nothing in common, dataset_cameras needs nothing; depth cannot be measured\n";
+    }
+    return "";
   }
 
   json Json(const DatasetScan& scan) const {
@@ -147,7 +165,8 @@ std::function<void()> DeclareProtocolMake(Flags& flags) {
       .Add(
           "mask_path",
           &command->mask_path,
-          "Folder with a folder of true masks per scene: <scene>/<photo name>.png, 0 = distractor");
+          "Folder with a folder of true masks per scene, <scene>/<photo name>.png, 0 = distractor; "
+          "default masks/ beside a scene's images/");
   AddSamplingFlags(flags, command->protocol.sampling);
   AddConditionFlags(flags, command->protocol.conditions);
   flags.Group("Output")

@@ -135,6 +135,7 @@ TEST_F(ScanDatasetTest, DtuTakesItsScans) {
 
 TEST_F(ScanDatasetTest, FolderIsOneSceneOrSeveral) {
   WriteAll("b/images", {"x.jpg"});
+  WriteAll("b/masks", {"x.jpg.png"});
   WriteAll("a", {"y clutter.jpg", "z.jpg"});
   Write("notes/readme.txt");
   const DatasetScan scan = ScanDataset(DatasetKind::kFolder, folder_.path());
@@ -142,7 +143,9 @@ TEST_F(ScanDatasetTest, FolderIsOneSceneOrSeveral) {
   EXPECT_EQ(scan.scenes[0].image_path, "a");
   EXPECT_THAT(scan.scenes[0].clean, ElementsAre("z.jpg"));
   EXPECT_THAT(scan.scenes[0].clutter, ElementsAre("y clutter.jpg"));
+  EXPECT_EQ(scan.scenes[0].mask_path, "");
   EXPECT_EQ(scan.scenes[1].image_path, "b/images");
+  EXPECT_EQ(scan.scenes[1].mask_path, "b/masks");
   EXPECT_THAT(scan.left_out, UnorderedElementsAre("notes"));
   const DatasetScan one = ScanDataset(DatasetKind::kFolder, folder_ / "a");
   ASSERT_EQ(one.scenes.size(), 1u);

@@ -355,6 +355,9 @@ TEST_F(ProtocolCommand, MistakesAreToldInOneLine) {
   EXPECT_FALSE(fs::exists(folder_ / "p.json"));
   ASSERT_EQ(Make("robustnerf").exit_code, 0);
   EXPECT_THAT(Make("robustnerf").output, HasSubstr("exists"));
+  EXPECT_THAT(
+      Make("robustnerf", {"--overwrite", "--test_images", "clutter", "--num_images", "2"}).output,
+      HasSubstr("warning: scene yoda has no test image among its clean ones"));
   const ColmapRun tables = Run({"protocol",
                                 "tables",
                                 "--protocol_path",
