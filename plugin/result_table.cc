@@ -45,16 +45,18 @@ std::string Cell(double value, const TableMetric& metric) {
   return FormatNumber(value, metric.digits);
 }
 
-// The best printed value of a column among the rows of one kind; nullopt without values.
+// The best printed value of a column among the rows of one kind; nullopt without two of them.
 std::optional<std::string> Best(const ResultTable& table, size_t column, bool is_published) {
   const TableMetric& metric = MetricOf(table, column);
   std::optional<double> best;
+  int num_values = 0;
   for (const TableRow& row : table.rows) {
     const double value = row.values[column];
     if (row.is_published != is_published || !std::isfinite(value)) continue;
+    ++num_values;
     if (!best || (metric.is_lower_better ? value < *best : value > *best)) best = value;
   }
-  if (!best) return std::nullopt;
+  if (num_values < 2) return std::nullopt;
   return Cell(*best, metric);
 }
 

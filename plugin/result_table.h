@@ -40,8 +40,8 @@ struct ResultTable {
 std::string FormatCsv(const ResultTable& table);
 
 // A table environment (needs amsmath, booktabs and graphicx) of rounded values, "-" = none:
-// measured rows, then the paper's, which are marked. The best of either kind is bold, with all that
-// print alike.
+// measured rows, then the paper's, which are marked. Among two or more rows of either kind the best
+// value is bold, with all that print alike.
 std::string FormatLatex(const ResultTable& table);
 
 // Plain text with what LaTeX would take for its own replaced.

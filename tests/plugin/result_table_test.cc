@@ -43,15 +43,19 @@ TEST(FormatLatex, HeadsSpanTheirColumns) {
 }
 
 TEST(FormatLatex, BestOfEitherKindIsBoldWithItsEquals) {
-  const std::string latex = FormatLatex(SampleTable());
-  // 0.104 and 0.096 both print as 0.10; what was not measured is a dash.
+  ResultTable table = SampleTable();
+  const std::string latex = FormatLatex(table);
+  // 0.104 and 0.096 both print as 0.10; what was not measured is a dash; one value is no best.
   EXPECT_THAT(latex,
-              HasSubstr("one & \\textbf{0.10} & 0.50 & \\textbf{0.20} & - & \\textbf{0.30} & "
-                        "\\textbf{0.30} & \\textbf{0.10} & 0.10 \\\\\n"));
+              HasSubstr("one & \\textbf{0.10} & 0.50 & \\textbf{0.20} & - & 0.30 & "
+                        "\\textbf{0.30} & 0.10 & 0.10 \\\\\n"));
   EXPECT_THAT(latex,
               HasSubstr("two\\_2 & \\textbf{0.10} & \\textbf{0.60} & 0.40 & - & - & "
                         "\\textbf{0.30} & - & \\textbf{0.20} \\\\\n"));
-  EXPECT_THAT(latex, HasSubstr("\\midrule\n$\\pi^3$ (paper) & \\textbf{0.01} & \\textbf{0.90}"));
+  EXPECT_THAT(latex, HasSubstr("\\midrule\n$\\pi^3$ (paper) & 0.01 & 0.90"));
+  table.rows.push_back(table.rows.back());
+  table.rows.back().values[0] = 0.02;
+  EXPECT_THAT(FormatLatex(table), HasSubstr("(paper) & \\textbf{0.01} & \\textbf{0.90}"));
 }
 
 TEST(FormatCsv, HoldsEveryDigit) {
