@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "network/train.h"
+
+#include "network/checkpoint.h"
+#include "network/weights.h"
+#include "scene/error.h"
+#include "scene/files.h"
+#include "tests/network/tiny_training.h"
+#include "tests/support/temporary_folder.h"
+
+#include <filesystem>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include <ATen/ATen.h>
+#include <gtest/gtest.h>
+
+namespace vgtw {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Stopped {};
+
+TEST(Train, StoppedRunEndsWithTheSameBits) {
+  const TemporaryFolder folder;
+  TrainOptions options = ShortRun(/*lora_only=*/false);
+  options.ema_decay = 0.9;
+  Train(options, folder / "whole");
+  options.save_every_sec = 1e-9;
+  const auto stop = [](int64_t done, int64_t) {
+    if (done == 4) throw Stopped();
+  };
+  EXPECT_THROW(Train(options, folder / "stopped", stop), Stopped);
+  Train(options, folder / "stopped");
+  for (const char* name : {"weights.safetensors", "log.jsonl"}) {
+    EXPECT_TRUE(ReadFile(folder / "whole" / name) == ReadFile(folder / "stopped" / name)) << name;
+  }
+}
+
+TEST(Train, WritesLoraAndHeadThatLoadOverTheirBase) {
+  const TemporaryFolder folder;
+  TrainOptions options = ShortRun(/*lora_only=*/false);
+  options.num_steps = 1;
+  Train(options, folder / "base");
+  TrainOptions extension = ShortRun(/*lora_only=*/true);
+  extension.weights = {folder / "base" / "weights.safetensors"};
+  extension.num_steps = 2;
+  Train(extension, folder / "lora");
+  const fs::path lora = folder / "lora" / "weights.safetensors";
+  const Checkpoint written(lora);
+  for (const auto& [name, tensor] : written.tensors()) {
+    EXPECT_TRUE(name.starts_with("mask_head.") || name.find(".attn.lora_") != std::string::npos)
+        << name;
+  }
+  const LoadedNetwork network = LoadNetwork({extension.weights.front(), lora}, {});
+  EXPECT_EQ(network.description.kind, NetworkKind::kVgtw);
+  EXPECT_EQ(network.description.side_px, options.scenes.width);
+  const auto& config = std::get<VggtConfig>(network.description.config);
+  EXPECT_EQ(config.lora->rank, 2);
+  EXPECT_EQ(config.num_camera_heads, 2);
+  EXPECT_EQ(config.num_camera_blocks, 1);
+  EXPECT_FALSE(config.has_point_head);
+}
+
+TEST(Train, LowersTheLossOfANewNetwork) {
+  const TemporaryFolder folder;
+  TrainOptions options = ShortRun(/*lora_only=*/false);
+  options.num_steps = 60;
+  options.learning_rate = 3e-3;
+  options.validate_every = 60;
+  options.num_validation_scenes = 8;
+  options.save_every_sec = 1e9;
+  TrainOptions untrained = options;
+  untrained.num_steps = 1;
+  untrained.learning_rate = 1e-12;
+  untrained.warmup_share = untrained.decay_share = 0.0;
+  const ValidationScore before = Train(untrained, folder / "before").validations.back();
+  const ValidationScore after = Train(options, folder / "after").validations.back();
+  EXPECT_LT(after.abs_rel, before.abs_rel);
+  EXPECT_LT(after.rotation_deg, before.rotation_deg + 1.0);
+}
+
+TEST(Train, RefusesToGoOnWithOtherOptions) {
+  const TemporaryFolder folder;
+  TrainOptions options = ShortRun(/*lora_only=*/false);
+  options.num_steps = 2;
+  options.warmup_share = 0.0;
+  Train(options, folder / "run");
+  options.learning_rate *= 2.0;
+  EXPECT_THROW(Train(options, folder / "run"), Error);
+  const std::string weights = ReadFile(folder / "run" / "weights.safetensors");
+  ForgetRun(folder / "run");
+  EXPECT_TRUE(fs::is_empty(folder / "run"));
+  Train(options, folder / "run");
+  EXPECT_TRUE(ReadFile(folder / "run" / "weights.safetensors") != weights);
+}
+
+TEST(Train, LossThatIsNotFiniteIsAnError) {
+  const TemporaryFolder folder;
+  TrainOptions options = ShortRun(/*lora_only=*/false);
+  options.learning_rate = 1e30;
+  options.warmup_share = 0.0;
+  options.num_steps = 4;
+  options.num_validation_scenes = 0;
+  EXPECT_THROW(Train(options, folder / "run"), Error);
+}
+
+TEST(Train, FaultyOptionsAreNamed) {
+  const auto message = [](const auto& change) -> std::string {
+    TrainOptions options = ShortRun(/*lora_only=*/false);
+    change(options);
+    try {
+      options.Check();
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "no fault";
+  };
+  EXPECT_EQ(message([](TrainOptions&) {}), "no fault");
+  EXPECT_NE(message([](TrainOptions& o) { o.num_steps = 0; }).find("num_steps"), std::string::npos);
+  EXPECT_NE(message([](TrainOptions& o) {
+              o.learning_rate = std::numeric_limits<double>::quiet_NaN();
+            }).find("learning_rate"),
+            std::string::npos);
+  EXPECT_NE(message([](TrainOptions& o) { o.loss_weights[0] = -1.0; }).find("mask_weight"),
+            std::string::npos);
+  EXPECT_NE(message([](TrainOptions& o) { o.warmup_share = 0.9; }).find("decay_share"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace vgtw
