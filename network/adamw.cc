@@ -25,6 +25,10 @@ double LearningRateSchedule::At(int64_t step) const {
   return kLowestRate + 0.5 * (peak - kLowestRate) * (1.0 + std::cos(std::numbers::pi * share));
 }
 
+bool AreFinite(const AdamW::GroupNorms& norms) {
+  return std::all_of(norms.begin(), norms.end(), [](double norm) { return std::isfinite(norm); });
+}
+
 AdamW::AdamW(TrainedParameters& parameters, const AdamWOptions& options)
     : parameters_(parameters), options_(options) {
   for (const TrainedParameter& parameter : parameters.all()) {
@@ -60,6 +64,7 @@ AdamW::GroupNorms AdamW::Step(std::vector<at::Tensor> gradients,
                               int64_t step,
                               double learning_rate) {
   const GroupNorms norms = Clip(gradients);
+  if (!AreFinite(norms)) return norms;
   const auto power = static_cast<double>(step + 1);
   const double correction1 = 1.0 - std::pow(options_.beta1, power);
   const double correction2 = 1.0 - std::pow(options_.beta2, power);

@@ -46,7 +46,8 @@ class AdamW {
   AdamW(TrainedParameters& parameters, const AdamWOptions& options);
 
   // Moves the parameters against `gradients` (same order; undefined = zero) and returns the norm
-  // that each group had before it was clipped. `step` counts from 0.
+  // that each group had before it was clipped; if one is not finite, nothing moves. `step` counts
+  // from 0.
   using GroupNorms = std::array<double, kNumParameterGroups>;
   GroupNorms Step(std::vector<at::Tensor> gradients, int64_t step, double learning_rate);
 
@@ -60,5 +61,7 @@ class AdamW {
   AdamWOptions options_;
   Moments moments_;
 };
+
+bool AreFinite(const AdamW::GroupNorms& norms);
 
 }  // namespace vgtw

@@ -108,7 +108,9 @@ FolderSamples::FolderSamples(const FolderSampleOptions& options) : options_(opti
   for (const MaskedFolder& folder : options.folders) {
     Scene scene{folder, ListImages(folder.image_path)};
     if (scene.names.size() < 2) {
-      Fail(folder.image_path, "holds one photo", "two or more of a scene");
+      Fail(folder.image_path,
+           "holds " + std::to_string(scene.names.size()) + " photo",
+           "two or more of a scene");
     }
     for (const std::string& name : scene.names) CheckMask(folder, name);
     scenes_.push_back(std::move(scene));

@@ -255,11 +255,11 @@ class TrainRun {
         AddGradients(leaves_[worker], gradients);
       }
     }
-    if (!std::isfinite(result.loss)) {
-      throw Error("the loss is not finite at step " + std::to_string(step) +
+    const auto norms = optimiser_.Step(std::move(gradients), step, result.learning_rate);
+    if (!std::isfinite(result.loss) || !AreFinite(norms)) {
+      throw Error("the loss or its gradient is not finite at step " + std::to_string(step) +
                   "; use a lower --learning_rate, and --overwrite to begin anew");
     }
-    optimiser_.Step(std::move(gradients), step, result.learning_rate);
     return result;
   }
 

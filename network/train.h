@@ -43,9 +43,9 @@ struct TrainOptions {
   // In the order of TrainingLoss; the defaults are the paper's, which has no labels of geometry.
   std::array<double, kNumTrainingLosses> loss_weights = {0.2, 0.01, 0.05, 0.0, 0.0};
 
-  // What is learnt from: rendered scenes without end, and folders, by their shares.
+  // What is learnt from: folders, if there are any, and rendered scenes without end.
   SceneStreamOptions scenes = {};
-  double scene_share = 1.0;
+  double scene_share = 0.0;  // of the samples, beside folders
   std::vector<MaskedFolder> folders;
 
   int64_t num_steps = 1000;

@@ -52,23 +52,35 @@ std::string Metadata(const SafetensorsFile& file, const char* key, const fs::pat
   Fail(path, std::string("has no metadata ") + key, "the state of a training run");
 }
 
-void CopyInto(const SafetensorsFile& file,
-              const std::string& name,
-              const fs::path& path,
-              const at::Tensor& target) {
-  if (!target.defined()) return;
+// What is read goes to `target` once all of it was found right.
+struct Copy {
+  at::Tensor values;
+  at::Tensor target;
+};
+
+Copy ReadTensor(const SafetensorsFile& file,
+                const std::string& name,
+                const fs::path& path,
+                const at::Tensor& target) {
   const auto found = file.tensors().find(name);
-  const auto num_bytes = static_cast<size_t>(target.numel()) * sizeof(float);
+  const std::vector<uint64_t> shape(target.sizes().begin(), target.sizes().end());
   if (found == file.tensors().end() || found->second.type != TensorType::kF32 ||
-      found->second.bytes.size() != num_bytes) {
+      found->second.shape != shape) {
     Fail(path,
-         "has no tensor '" + name + "' of " + std::to_string(target.numel()) + " numbers",
+         "has no tensor '" + name + "' of the network's shape",
          "the state of this network's training",
          "give another --output_path");
   }
   const at::Tensor values = at::empty(target.sizes(), at::kFloat);
-  std::memcpy(values.data_ptr(), found->second.bytes.data(), num_bytes);
-  target.copy_(values);
+  std::memcpy(values.data_ptr(), found->second.bytes.data(), found->second.bytes.size());
+  return {values, target};
+}
+
+int64_t ParseSteps(const std::string& text, const fs::path& path) {
+  int64_t steps = -1;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), steps);
+  if (error == std::errc() && end == text.data() + text.size() && steps >= 0) return steps;
+  Fail(path, "has '" + Printable(text) + "' as its steps", "a number");
 }
 
 std::string Join(const std::array<int64_t, 4>& numbers) {
@@ -133,20 +145,20 @@ std::optional<int64_t> ReadTrainingState(const fs::path& path,
          "the same ones, to go on with it",
          "give them, or another --output_path");
   }
-  const std::string steps = Metadata(file, kStepsKey, path);
-  int64_t num_steps_done = -1;
-  std::from_chars(steps.data(), steps.data() + steps.size(), num_steps_done);
-  if (num_steps_done < 0) {
-    Fail(path, "has " + Printable(steps) + " as its steps", "a number");
-  }
+  const int64_t num_steps_done = ParseSteps(Metadata(file, kStepsKey, path), path);
+  std::vector<Copy> copies;
+  const auto read = [&](const char* kind, const std::string& name, const at::Tensor& target) {
+    copies.push_back(ReadTensor(file, kind + name, path, target));
+  };
   for (size_t i = 0; i < parameters.all().size(); ++i) {
-    TrainedParameter& parameter = parameters.all()[i];
+    const TrainedParameter& parameter = parameters.all()[i];
     if (!parameter.is_trained) continue;
-    CopyInto(file, "value." + parameter.name, path, parameter.value);
-    CopyInto(file, "first." + parameter.name, path, moments.first[i]);
-    CopyInto(file, "second." + parameter.name, path, moments.second[i]);
-    if (!moments.mean.empty()) CopyInto(file, "mean." + parameter.name, path, moments.mean[i]);
+    read("value.", parameter.name, parameter.value);
+    read("first.", parameter.name, moments.first[i]);
+    read("second.", parameter.name, moments.second[i]);
+    if (!moments.mean.empty()) read("mean.", parameter.name, moments.mean[i]);
   }
+  for (const Copy& copy : copies) copy.target.copy_(copy.values);
   return num_steps_done;
 }
 
@@ -169,12 +181,11 @@ void CutLog(const fs::path& path, int64_t num_steps_done) {
   std::string kept;
   for (std::string line; std::getline(lines, line);) {
     const auto entry = nlohmann::json::parse(line, nullptr, /*allow_exceptions=*/false);
-    const bool is_later = !entry.is_object() || entry.value("step", int64_t{0}) >= num_steps_done;
-    const bool is_validation = entry.is_object() && entry.contains("mask_f1");
-    const bool keeps =
-        entry.is_object() &&
-        (is_validation ? entry.value("step", int64_t{0}) <= num_steps_done : !is_later);
-    if (keeps) kept += line + "\n";
+    if (!entry.is_object() || !entry.contains("step") || !entry["step"].is_number()) continue;
+    // A step is counted from 0, a validation by the steps before it.
+    const bool is_validation = entry.contains("mask_f1");
+    const int64_t last = is_validation ? num_steps_done : num_steps_done - 1;
+    if (entry["step"].get<int64_t>() <= last) kept += line + "\n";
   }
   WriteFileAtomically(path, kept);
 }

@@ -208,7 +208,7 @@ struct TrainCommand {
             "mask_path", &mask_path, "Their masks, <photo name>.png, 0 = distractor; folders alike")
         .Add("scene_share",
              &options.scene_share,
-             "Share of rendered scenes beside photos; 1 without photos")
+             "Share of rendered scenes beside photos; without photos all are")
         .Add("width", &options.scenes.width, "Of the network's images, pixels, a multiple of 14")
         .Add("height", &options.scenes.height, "Likewise")
         .Add("min_views", &options.scenes.min_views, "Views of a sample, at least")

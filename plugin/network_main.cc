@@ -69,7 +69,7 @@ std::vector<Command> NetworkCommands() {
        kTrainSummary,
        DeclareTrain,
        "  vgtw train --weights_path vggt.safetensors --image_path scenes/ --mask_path masks/ "
-       "--scene_share 0 --output_path run/\n"
+       "--output_path run/\n"
        "  vgtw train --config examples/train_tiny.conf --output_path run/"},
       {"weights", kWeightsSummary},
       {"weights inspect",

@@ -104,6 +104,20 @@ TEST_F(AdamWTest, NormsOfGroupsAreThoseBeforeClipping) {
   }
 }
 
+TEST_F(AdamWTest, GradientThatIsNotFiniteMovesNothing) {
+  AdamW optimiser(parameters_, {});
+  std::vector<at::Tensor> before;
+  for (const TrainedParameter& parameter : parameters_.all()) {
+    before.push_back(parameter.value.clone());
+  }
+  std::vector<at::Tensor> gradients = Gradients(1.0);
+  gradients.back().flatten()[0] = std::nan("");
+  EXPECT_FALSE(AreFinite(optimiser.Step(std::move(gradients), 0, 0.1)));
+  for (size_t i = 0; i < before.size(); ++i) {
+    EXPECT_TRUE(at::equal(before[i], parameters_.all()[i].value));
+  }
+}
+
 TEST_F(AdamWTest, MeanOfValuesFollowsThem) {
   AdamW optimiser(parameters_, {.max_group_norm = 0.0, .ema_decay = 0.5});
   const at::Tensor before = parameters_.all()[0].value.clone();

@@ -52,6 +52,25 @@ TEST(TrainedParameters, OfTheExtensionAreLoraAndDistractorHead) {
   EXPECT_EQ(num_lora, 2 * 4 * 4 * 2 * 16);  // kinds of blocks, depth, matrices, rank, channels
 }
 
+// Names and shapes are those of the paper's checkpoint: 6,291,456 numbers of LoRA and 32,671,041 of
+// the head.
+TEST(TrainedParameters, OfThePublishedSizesAreThoseOfTheCheckpoint) {
+  VggtConfig config;
+  config.lora = LoraConfig{};
+  config.has_distractor_head = true;
+  ListingSource listing;
+  const Vggt model(ParameterScope(listing), config);
+  int64_t num_lora = 0;
+  int64_t num_head = 0;
+  for (const ListingSource::Row& row : listing.rows()) {
+    const int64_t num = c10::multiply_integers(row.shape);
+    if (GroupOf(row.name) == ParameterGroup::kLora) num_lora += num;
+    if (GroupOf(row.name) == ParameterGroup::kDistractorHead) num_head += num;
+  }
+  EXPECT_EQ(num_lora, 6291456);
+  EXPECT_EQ(num_head, 32671041);
+}
+
 TEST(TrainedParameters, OfANewNetworkAreAll) {
   const TrainedParameters parameters = Make(TrainableNetwork(), TrainedParts::kAll);
   int64_t num = 0;

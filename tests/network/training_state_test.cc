@@ -3,6 +3,7 @@
 
 #include "scene/error.h"
 #include "scene/files.h"
+#include "scene/safetensors.h"
 #include "tests/network/tiny_training.h"
 #include "tests/support/temporary_folder.h"
 
@@ -73,6 +74,23 @@ TEST_F(TrainingState, ThatIsTruncatedIsRefused) {
   WriteTrainingState(path, run.parameters, run.optimiser.moments(), 17, "options");
   std::filesystem::resize_file(path, std::filesystem::file_size(path) - 4);
   EXPECT_THROW(ReadTrainingState(path, "options", run.parameters, run.optimiser.moments()), Error);
+}
+
+TEST_F(TrainingState, ThatLacksATensorChangesNothing) {
+  const std::filesystem::path path = folder_ / "state.safetensors";
+  SmallRun run(1);
+  WriteTrainingState(path, run.parameters, run.optimiser.moments(), 17, "options");
+  {
+    const SafetensorsFile file(path);
+    StoredTensors tensors = file.tensors();
+    tensors.erase("second." + run.parameters.all().back().name);
+    WriteSafetensors(path, tensors, file.metadata());
+  }
+  SmallRun other(2);
+  const at::Tensor before = other.parameters.all()[0].value.clone();
+  EXPECT_THROW(ReadTrainingState(path, "options", other.parameters, other.optimiser.moments()),
+               Error);
+  EXPECT_TRUE(at::equal(before, other.parameters.all()[0].value));
 }
 
 TEST_F(TrainingState, LogLosesWhatCameAfterIt) {
