@@ -33,8 +33,9 @@ CameraHead::CameraHead(const ParameterScope& scope, const VggtConfig& config)
   BlockConfig block;
   block.attention = {.dim = 2 * config.dim, .num_heads = config.num_camera_heads};
   block.norm_eps = kNormEps;
-  for (int64_t i = 0; i < config.num_camera_blocks; ++i)
+  for (int64_t i = 0; i < config.num_camera_blocks; ++i) {
     trunk_.emplace_back(scope["trunk"][i], block);
+  }
 }
 
 std::vector<at::Tensor> CameraHead::operator()(const at::Tensor& tokens) const {

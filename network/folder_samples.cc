@@ -2,13 +2,13 @@
 #include "network/folder_samples.h"
 
 #include "network/config.h"
+#include "network/grid_tensors.h"
 #include "scene/error.h"
 #include "scene/image_io.h"
 #include "scene/random.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
 #include <ATen/ATen.h>
@@ -41,15 +41,6 @@ void CheckMask(const MaskedFolder& folder, const std::string& name) {
     };
     Fail(mask, "is of " + text(mask_size) + " pixels", "its photo's " + text(size));
   }
-}
-
-template <typename T>
-at::Tensor Bytes(const Grid<T>& grid, int64_t num_channels) {
-  const at::Tensor bytes = at::empty(
-      {static_cast<int64_t>(grid.height()), static_cast<int64_t>(grid.width()), num_channels},
-      at::kByte);
-  std::memcpy(bytes.data_ptr(), grid.data().data(), static_cast<size_t>(bytes.numel()));
-  return bytes.permute({2, 0, 1}).to(at::kFloat);
 }
 
 struct Window {
@@ -130,8 +121,10 @@ TrainingSample FolderSamples::Get(uint64_t idx) const {
   std::vector<at::Tensor> images, distractor;
   for (size_t view = 0; view < num_views; ++view) {
     std::swap(names[view], names[view + random.Bits() % (names.size() - view)]);
-    const at::Tensor photo = Bytes(ReadRgbImage(scene.folder.image_path / names[view]), 3) / 255.0;
-    const at::Tensor kept = Bytes(ReadStaticMask(MaskOf(scene.folder, names[view])), 1) / 255.0;
+    const at::Tensor photo = ToTensor(ReadRgbImage(scene.folder.image_path / names[view]));
+    const at::Tensor kept =
+        ToTensor(ReadStaticMask(MaskOf(scene.folder, names[view]))).unsqueeze(0).to(at::kFloat) /
+        255.0;
     const Window window = DrawWindow(photo, aspect, random);
     images.push_back(change_colours(Cut(photo, window, options_.height, options_.width)));
     distractor.push_back(1.0 - Cut(kept, window, options_.height, options_.width).squeeze(0));

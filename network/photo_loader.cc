@@ -2,6 +2,7 @@
 #include "network/photo_loader.h"
 
 #include "network/config.h"
+#include "network/grid_tensors.h"
 #include "scene/error.h"
 #include "scene/parallel.h"
 
@@ -9,26 +10,6 @@
 #include <c10/core/InferenceMode.h>
 
 namespace vgtw {
-namespace {
-
-// [3, H, W] in [0, 1]
-at::Tensor ToTensor(const RgbImage& image) {
-  static_assert(sizeof(Rgb) == 3, "pixels lie one after the other");
-  const at::Tensor bytes = at::from_blob(const_cast<Rgb*>(image.data().data()),
-                                         {image.height(), image.width(), 3},
-                                         at::TensorOptions(at::kByte));
-  return bytes.permute({2, 0, 1}).to(at::kFloat).div_(255.0);
-}
-
-// [H, W], bool
-at::Tensor IsExcluded(const StaticMask& network_mask) {
-  const at::Tensor values = at::from_blob(const_cast<uint8_t*>(network_mask.data().data()),
-                                          {network_mask.height(), network_mask.width()},
-                                          at::TensorOptions(at::kByte));
-  return values.eq(0);
-}
-
-}  // namespace
 
 PhotoLoader::PhotoLoader(const std::filesystem::path& image_folder,
                          const std::vector<std::string>& image_names,
@@ -77,7 +58,7 @@ at::Tensor PhotoLoader::LoadExcluded(int begin,
                   std::to_string(size.width) + "x" + std::to_string(size.height));
     }
     excluded[i].copy_(
-        IsExcluded(MakeNetworkMask(static_mask, placement(view), options_, /*outside=*/255)));
+        ToTensor(MakeNetworkMask(static_mask, placement(view), options_, /*outside=*/255)).eq(0));
   });
   return excluded;
 }

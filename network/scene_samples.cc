@@ -2,10 +2,10 @@
 #include "network/scene_samples.h"
 
 #include "network/config.h"
+#include "network/grid_tensors.h"
 #include "scene/error.h"
 #include "scene/random.h"
 
-#include <cstring>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -17,22 +17,6 @@ namespace vgtw {
 namespace {
 
 constexpr float kSkyDepth = 60.0f;  // the stream's dome is farther, everything else nearer
-
-// RGB bytes [H, W, 3] -> [3, H, W] in [0, 1].
-at::Tensor ToTensor(const RgbImage& image) {
-  const auto height = static_cast<int64_t>(image.height());
-  const auto width = static_cast<int64_t>(image.width());
-  const at::Tensor bytes = at::empty({height, width, 3}, at::kByte);
-  std::memcpy(bytes.data_ptr(), image.data().data(), static_cast<size_t>(bytes.numel()));
-  return bytes.permute({2, 0, 1}).to(at::kFloat) / 255.0;
-}
-
-at::Tensor ToTensor(const Grid<float>& map) {
-  const at::Tensor values = at::empty(
-      {static_cast<int64_t>(map.height()), static_cast<int64_t>(map.width())}, at::kFloat);
-  std::memcpy(values.data_ptr(), map.data().data(), map.data().size() * sizeof(float));
-  return values;
-}
 
 at::Tensor ToTensor(const Rigid3d& cam_from_world) {
   const Eigen::Matrix3d rotation = cam_from_world.rotation.toRotationMatrix();
