@@ -4,8 +4,8 @@
 #include "scene/error.h"
 #include "scene/files.h"
 #include "scene/image_io.h"
+#include "tests/bridge/import_case.h"
 #include "tests/bridge/numpy_files.h"
-#include "tests/support/temporary_folder.h"
 
 #include <limits>
 
@@ -39,13 +39,8 @@ std::vector<float> DepthValues(size_t frame) {
   return depth;
 }
 
-struct Case {
-  TemporaryFolder folder;
-  fs::path photos = folder / "photos";
-  fs::path input = folder / "demo_tmp";
-  fs::path output = folder / "out";
-
-  Case() {
+struct Case : ImportCase {
+  Case() : ImportCase("demo_tmp") {
     WritePhotos(photos, {"frame_08.png", "frame_09.png", "frame_10.png"}, 64, 48);
     for (const char* name : {"camera", "depth", "conf", "color"}) {
       fs::create_directories(input / name);
@@ -59,9 +54,6 @@ struct Case {
       WriteImage(input / "color" / (number + ".png"), RgbImage(32, 16));
     }
   }
-  void Write(const std::string& name, const std::string& bytes) const {
-    WriteFileAtomically(input / name, bytes);
-  }
   void WriteCamera(size_t frame,
                    const std::vector<float>& pose,
                    const std::string& shape = "(4, 4)",
@@ -70,23 +62,7 @@ struct Case {
              {{"pose", NpyFloats(shape, pose)},
               {"intrinsics", NpyFloats("(3, 3)", {focal, 0, 16, 0, focal, 8, 0, 0, 1})}});
   }
-  ImportSummary Run(const ImportOptions& options = {}) {
-    return Import(input, photos, output, options);
-  }
-  std::string Message(const ImportOptions& options = {}) {
-    try {
-      Run(options);
-    } catch (const Error& error) {
-      EXPECT_FALSE(fs::exists(output));
-      return error.what();
-    }
-    return "";
-  }
 };
-
-void ExpectHas(const std::string& message, const std::string& part) {
-  EXPECT_NE(message.find(part), std::string::npos) << message;
-}
 
 TEST(ImportCut3r, PosesDepthsAndCamerasAreThoseOfTheFiles) {
   Case test;

@@ -4,8 +4,8 @@
 #include "scene/error.h"
 #include "scene/files.h"
 #include "scene/image_io.h"
+#include "tests/bridge/import_case.h"
 #include "tests/bridge/numpy_files.h"
-#include "tests/support/temporary_folder.h"
 
 #include <cmath>
 #include <cstdio>
@@ -58,13 +58,8 @@ std::string TrajectoryLine(size_t frame, bool scalar_last = false) {
   return line;
 }
 
-struct Case {
-  TemporaryFolder folder;
-  fs::path photos = folder / "photos";
-  fs::path input = folder / "davis";
-  fs::path output = folder / "out";
-
-  Case() {
+struct Case : ImportCase {
+  Case() : ImportCase("davis") {
     WritePhotos(photos, {"00009.png", "00010.png", "00011.png"}, 64, 48);
     fs::create_directories(input);
     std::string trajectory;
@@ -87,26 +82,7 @@ struct Case {
     Write("pred_traj.txt", trajectory);
     Write("pred_intrinsics.txt", intrinsics);
   }
-  void Write(const std::string& name, const std::string& bytes) const {
-    WriteFileAtomically(input / name, bytes);
-  }
-  ImportSummary Run(const ImportOptions& options = {}) {
-    return Import(input, photos, output, options);
-  }
-  std::string Message(const ImportOptions& options = {}) {
-    try {
-      Run(options);
-    } catch (const Error& error) {
-      EXPECT_FALSE(fs::exists(output));
-      return error.what();
-    }
-    return "";
-  }
 };
-
-void ExpectHas(const std::string& message, const std::string& part) {
-  EXPECT_NE(message.find(part), std::string::npos) << message;
-}
 
 TEST(ImportMonst3r, PosesDepthsAndMasksAreThoseOfTheFiles) {
   Case test;

@@ -3,9 +3,9 @@
 #include "bridge/predictions.h"
 #include "scene/error.h"
 #include "scene/files.h"
+#include "tests/bridge/import_case.h"
 #include "tests/bridge/numpy_files.h"
 #include "tests/bridge/sample_scene.h"
-#include "tests/support/temporary_folder.h"
 
 #include <cmath>
 #include <limits>
@@ -20,35 +20,15 @@ using Arrays = std::map<std::string, std::string>;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-struct Case {
-  TemporaryFolder folder;
-  fs::path photos = folder / "photos";
-  fs::path input = folder / "run";
-  fs::path output = folder / "out";
-
-  Case(int photo_width, int photo_height, const std::string& file, const Arrays& arrays) {
+struct Case : ImportCase {
+  Case(int photo_width, int photo_height, const std::string& file, const Arrays& arrays)
+      : ImportCase("run") {
     WritePhotos(photos, {"a.png", "b.png", "c.png"}, photo_width, photo_height);
     fs::create_directories(input);
     WriteNpz(input / file, arrays);
   }
-  ImportSummary Run(const ImportOptions& options = {}) {
-    return Import(input, photos, output, options);
-  }
-  std::string Message(const ImportOptions& options = {}) {
-    try {
-      Run(options);
-    } catch (const Error& error) {
-      EXPECT_FALSE(fs::exists(output));
-      return error.what();
-    }
-    return "";
-  }
   Prediction Read() const { return ReadPrediction(output); }
 };
-
-void ExpectHas(const std::string& message, const std::string& part) {
-  EXPECT_NE(message.find(part), std::string::npos) << message;
-}
 
 void ExpectTruePoses(const Prediction& prediction) {
   ASSERT_EQ(prediction.views.size(), kNumSceneViews);

@@ -3,8 +3,8 @@
 #include "bridge/predictions.h"
 #include "scene/error.h"
 #include "scene/files.h"
+#include "tests/bridge/import_case.h"
 #include "tests/bridge/numpy_files.h"
-#include "tests/support/temporary_folder.h"
 
 #include <gtest/gtest.h>
 
@@ -18,36 +18,16 @@ const std::string kTurned = "0.0 -1.0 0.0 1.0 1.0 0.0 0.0 2.0 0.0 0.0 1.0 3.0 0.
 const std::string kIdentity = "1.0 0.0 0.0 0.0 0.0 1.0 0.0 0.0 0.0 0.0 1.0 0.0 0.0 0.0 0.0 1.0\n";
 
 // Photos of 56x28, which VGGT's loader takes to 28x14 at a width of 28.
-struct Case {
-  TemporaryFolder folder;
-  fs::path input = folder / "exp";
-  Case() {
-    WritePhotos(folder / "photos", {"a.png", "b.png"}, 56, 28);
+struct Case : ImportCase {
+  Case() : ImportCase("exp") {
+    WritePhotos(photos, {"a.png", "b.png"}, 56, 28);
     fs::create_directories(input);
     Write("camera_poses.txt", kIdentity + kTurned);
     Write("intrinsic.txt", "30.5 31.0 14.0 7.0\n32.0 33.0 14.0 7.0\n");
     Write("camera_poses.ply", "ply\n");
   }
-  void Write(const std::string& name, const std::string& text) const {
-    WriteFileAtomically(folder / "exp" / name, text);
-  }
-  ImportSummary Run(const ImportOptions& options = {}) {
-    return Import(input, folder / "photos", folder / "out", options);
-  }
-  View ReadSecond() { return ReadPrediction(folder / "out").views[1].view; }
-  std::string Message() {
-    try {
-      Run();
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
-  }
+  View ReadSecond() { return ReadPrediction(output).views[1].view; }
 };
-
-void ExpectHas(const std::string& message, const std::string& part) {
-  EXPECT_NE(message.find(part), std::string::npos) << message;
-}
 
 TEST(ImportVggtLong, MatricesAreWorldFromCam) {
   for (const bool by_file : {false, true}) {
