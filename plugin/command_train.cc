@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "bridge/training_folders.h"
 #include "network/train.h"
 #include "plugin/commands.h"
 #include "plugin/network_commands.h"
@@ -91,22 +92,11 @@ struct TrainCommand {
     return {numbers[0], numbers[1], numbers[2], numbers[3]};
   }
 
-  // Photos right in --image_path are one scene; else each of its folders is one.
   std::vector<MaskedFolder> FindFolders() const {
     std::vector<MaskedFolder> folders;
-    bool has_photos = false;
-    if (!fs::is_directory(image_path)) {
-      Fail(image_path, "is not a folder", "photos, or a folder of photos for each scene");
+    for (const TrainingScene& scene : FindTrainingScenes(image_path, mask_path)) {
+      folders.push_back({scene.image_path, scene.mask_path});
     }
-    for (const fs::directory_entry& entry : fs::directory_iterator(image_path)) {
-      has_photos = has_photos || entry.is_regular_file();
-      if (!entry.is_directory()) continue;
-      folders.push_back({entry.path(), mask_path / entry.path().filename()});
-    }
-    if (has_photos) return {{image_path, mask_path}};
-    std::sort(folders.begin(), folders.end(), [](const MaskedFolder& a, const MaskedFolder& b) {
-      return a.image_path < b.image_path;
-    });
     return folders;
   }
 

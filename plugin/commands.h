@@ -14,6 +14,9 @@ namespace vgtw {
 
 // One function per command, each in its own command_<name>.cc: declares flags, returns the work.
 std::function<void()> DeclareCompare(Flags& flags);
+std::function<void()> DeclareDatasetCheck(Flags& flags);
+std::function<void()> DeclareDatasetCorrupt(Flags& flags);
+std::function<void()> DeclareDatasetStats(Flags& flags);
 std::function<void()> DeclareDemo(Flags& flags);
 std::function<void()> DeclareDoctor(Flags& flags);
 std::function<void()> DeclareEvaluateDepth(Flags& flags);
