@@ -5,6 +5,7 @@
 #include "network/pickle_tensors.h"
 #include "network/torch_archive.h"
 #include "scene/error.h"
+#include "scene/random.h"
 
 #include <algorithm>
 #include <cstring>
@@ -171,6 +172,26 @@ void Checkpoint::ReadShards(std::span<const std::byte> index, const std::filesys
   }
   format_ = "safetensors, " + std::to_string(tensors_by_file.size()) +
             (tensors_by_file.size() == 1 ? " shard" : " shards");
+}
+
+uint64_t Fingerprint(const Checkpoint& checkpoint) {
+  constexpr size_t kBytesOfEach = 4096;
+  uint64_t key = 0;
+  const auto add = [&key](std::span<const std::byte> bytes) {
+    key = HashKey({key, bytes.size()});
+    for (size_t i = 0; i < bytes.size(); i += sizeof(uint64_t)) {
+      uint64_t word = 0;
+      std::memcpy(&word, bytes.data() + i, std::min(sizeof(word), bytes.size() - i));
+      key = HashKey({key, word});
+    }
+  };
+  for (const auto& [name, tensor] : checkpoint.tensors()) {
+    add(std::as_bytes(std::span(name)));
+    add(std::as_bytes(std::span(tensor.shape)));
+    key = HashKey({key, static_cast<uint64_t>(tensor.type)});
+    add(tensor.bytes.first(std::min(kBytesOfEach, tensor.bytes.size())));
+  }
+  return key;
 }
 
 }  // namespace vgtw

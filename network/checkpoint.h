@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -53,6 +54,10 @@ class Checkpoint {
   std::map<std::string, std::string> metadata_;
   std::string format_;
 };
+
+// A number that tells checkpoints of different weights apart: of the names, types and shapes of all
+// tensors, and of 4 KiB of each.
+uint64_t Fingerprint(const Checkpoint& checkpoint);
 
 // Keeps the memory small of who reads all of a checkpoint once, with any number of threads.
 class PageLimiter {

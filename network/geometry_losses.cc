@@ -41,6 +41,26 @@ at::Tensor MeanDifference(const at::Tensor& error, const at::Tensor& is_known) {
   return sum / count.clamp_min(1);
 }
 
+// Of errors [M, H, W] of maps and their confidences; errors count where they are known.
+at::Tensor MapLoss(const at::Tensor& any_error,
+                   const at::Tensor& confidence,
+                   const at::Tensor& is_known,
+                   const MapLossOptions& options) {
+  options.Check();
+  const at::Tensor error = any_error.masked_fill(is_known.logical_not(), 0.0);
+  const at::Tensor c = AtLeastFloat(confidence);
+  const at::Tensor weighted = (c * error.abs() - options.alpha * c.log()) * is_known;
+  at::Tensor loss = weighted.sum() / is_known.sum().clamp_min(1);
+  for (int scale = 0; scale < options.num_gradient_scales; ++scale) {
+    const int64_t step = int64_t{1} << scale;
+    const auto sampled = [&](const at::Tensor& x) {
+      return x.slice(1, 0, x.size(1), step).slice(2, 0, x.size(2), step);
+    };
+    loss = loss + options.gradient_weight * MeanDifference(sampled(error), sampled(is_known));
+  }
+  return loss;
+}
+
 void CheckNotNegative(double value, const std::string& name) {
   VGTW_CHECK(value >= 0.0, name + " = " + std::to_string(value) + ", must be >= 0");
 }
@@ -114,38 +134,45 @@ at::Tensor CameraLoss(const std::vector<at::Tensor>& encodings,
   return loss / static_cast<double>(encodings.size());
 }
 
-void DepthLossOptions::Check() const {
-  VGTW_CHECK(alpha > 0.0, "DepthLossOptions::alpha = " + std::to_string(alpha) + ", must be > 0");
-  CheckNotNegative(gradient_weight, "DepthLossOptions::gradient_weight");
+void MapLossOptions::Check() const {
+  VGTW_CHECK(alpha > 0.0, "MapLossOptions::alpha = " + std::to_string(alpha) + ", must be > 0");
+  CheckNotNegative(gradient_weight, "MapLossOptions::gradient_weight");
   VGTW_CHECK(num_gradient_scales >= 0 && num_gradient_scales <= 16,
-             "DepthLossOptions::num_gradient_scales = " + std::to_string(num_gradient_scales) +
+             "MapLossOptions::num_gradient_scales = " + std::to_string(num_gradient_scales) +
                  ", must be in [0, 16]");
 }
 
 at::Tensor DepthLoss(const at::Tensor& depth,
                      const at::Tensor& confidence,
                      const at::Tensor& true_depth,
-                     const DepthLossOptions& options) {
-  options.Check();
+                     const MapLossOptions& options) {
   VGTW_CHECK(depth.dim() == 3, "depth [S, H, W]");
   VGTW_CHECK(confidence.sizes() == depth.sizes() && true_depth.sizes() == depth.sizes(),
              "one confidence and one true depth per pixel");
   const at::Tensor is_known = IsKnownDepth(true_depth);
-  const at::Tensor unknown = is_known.logical_not();
   const at::Tensor found = AtLeastFloat(depth);
-  const at::Tensor truth = true_depth.masked_fill(unknown, 0.0).to(found.scalar_type());
-  const at::Tensor error = (found - truth).masked_fill(unknown, 0.0);
-  const at::Tensor c = AtLeastFloat(confidence);
-  const at::Tensor weighted = (c * error.abs() - options.alpha * c.log()) * is_known;
-  at::Tensor loss = weighted.sum() / is_known.sum().clamp_min(1);
-  for (int scale = 0; scale < options.num_gradient_scales; ++scale) {
-    const int64_t step = int64_t{1} << scale;
-    const auto sampled = [&](const at::Tensor& x) {
-      return x.slice(1, 0, x.size(1), step).slice(2, 0, x.size(2), step);
-    };
-    loss = loss + options.gradient_weight * MeanDifference(sampled(error), sampled(is_known));
-  }
-  return loss;
+  const at::Tensor truth =
+      true_depth.masked_fill(is_known.logical_not(), 0.0).to(found.scalar_type());
+  return MapLoss(found - truth, confidence, is_known, options);
+}
+
+at::Tensor PointLoss(const at::Tensor& points,
+                     const at::Tensor& confidence,
+                     const GeometryTruth& truth,
+                     const MapLossOptions& options) {
+  VGTW_CHECK(points.dim() == 4 && points.size(3) == 3, "points [S, H, W, 3]");
+  VGTW_CHECK(points.slice(3, 0, 1).squeeze(3).sizes() == truth.depth.sizes() &&
+                 confidence.sizes() == truth.depth.sizes(),
+             "one confidence and one true depth per pixel");
+  const at::Tensor is_known = IsKnownDepth(truth.depth);
+  const at::Tensor found = AtLeastFloat(points);
+  const at::Tensor true_points = Unproject(truth.depth.masked_fill(is_known.logical_not(), 0.0),
+                                           {truth.cam_from_world, truth.intrinsics})
+                                     .to(found.scalar_type());
+  // x, y and z are maps of their own.
+  const auto maps = [](const at::Tensor& x) { return x.permute({3, 0, 1, 2}).flatten(0, 1); };
+  return MapLoss(
+      maps(found - true_points), confidence.repeat({3, 1, 1}), is_known.repeat({3, 1, 1}), options);
 }
 
 }  // namespace vgtw

@@ -59,7 +59,7 @@ at::Tensor CameraLoss(const std::vector<at::Tensor>& encodings,
                       const at::Tensor& true_encodings,
                       const CameraLossOptions& options = {});
 
-struct DepthLossOptions {
+struct MapLossOptions {
   // What a confidence earns: the best one for an error e is alpha / e; > 0.
   double alpha = 0.2;
   // Of the differences between neighbouring pixels; 0 = none.
@@ -76,6 +76,13 @@ struct DepthLossOptions {
 at::Tensor DepthLoss(const at::Tensor& depth,
                      const at::Tensor& confidence,
                      const at::Tensor& true_depth,
-                     const DepthLossOptions& options = {});
+                     const MapLossOptions& options = {});
+
+// The same of points [S, H, W, 3] of the world and their confidences [S, H, W]; means are also over
+// x, y and z. Points are known where the depths of `truth` are.
+at::Tensor PointLoss(const at::Tensor& points,
+                     const at::Tensor& confidence,
+                     const GeometryTruth& truth,
+                     const MapLossOptions& options = {});
 
 }  // namespace vgtw

@@ -3,6 +3,7 @@
 
 #include "network/config.h"
 #include "network/grid_tensors.h"
+#include "scene/demo_scenes.h"
 #include "scene/error.h"
 #include "scene/random.h"
 
@@ -51,14 +52,16 @@ std::vector<size_t> RandomOrder(size_t num_views, uint64_t key) {
 
 }  // namespace
 
-SceneSamples::SceneSamples(const SceneStreamOptions& options) : stream_(options) {
+SceneSamples::SceneSamples(const SceneStreamOptions& options, SceneKind kind)
+    : kind_(kind), stream_(options) {
   VGTW_CHECK(options.width % kPatchSize == 0 && options.height % kPatchSize == 0,
              "size of scenes " + std::to_string(options.width) + "x" +
                  std::to_string(options.height) + ", must be multiples of 14");
 }
 
 TrainingSample SceneSamples::Get(uint64_t idx) const {
-  const SceneSample scene = stream_.Sample(idx);
+  const SceneSample scene =
+      kind_ == SceneKind::kDemo ? SampleDemoScene(stream_.options(), idx) : stream_.Sample(idx);
   std::vector<at::Tensor> images, distractor, depth, poses, intrinsics;
   for (const size_t view :
        RandomOrder(scene.images.size(), HashKey({stream_.options().seed, idx, 1}))) {

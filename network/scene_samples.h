@@ -2,6 +2,7 @@
 // Internal to network/: needs LibTorch.
 #pragma once
 
+#include "network/train.h"
 #include "network/training_sample.h"
 #include "scene/scene_stream.h"
 
@@ -13,10 +14,11 @@ namespace vgtw {
 // and height of the stream must be multiples of the patch size.
 class SceneSamples : public SampleSource {
  public:
-  explicit SceneSamples(const SceneStreamOptions& options);
+  SceneSamples(const SceneStreamOptions& options, SceneKind kind);
   TrainingSample Get(uint64_t idx) const override;
 
  private:
+  SceneKind kind_;
   SceneStream stream_;
 };
 

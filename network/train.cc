@@ -6,6 +6,7 @@
 #include "network/plain_errors.h"
 #include "network/runtime.h"
 #include "network/scene_samples.h"
+#include "network/training_log.h"
 #include "network/training_loss.h"
 #include "network/training_mode.h"
 #include "network/training_options.h"
@@ -26,7 +27,6 @@
 #include <utility>
 
 #include <ATen/ATen.h>
-#include <nlohmann/json.hpp>
 #include <torch/csrc/autograd/autograd.h>
 
 namespace vgtw {
@@ -36,7 +36,6 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr char kStateFile[] = "state.safetensors";
-constexpr char kLogFile[] = "log.jsonl";
 constexpr char kWeightsFile[] = "weights.safetensors";
 
 // Keys of random choices that must not depend on each other.
@@ -63,9 +62,10 @@ TrainingSample ToDevice(TrainingSample sample, const at::Device& device) {
 class MixedSamples : public SampleSource {
  public:
   explicit MixedSamples(const TrainOptions& options)
-      : scenes_(options.scenes),
+      : scenes_(options.scenes, options.scene_kind),
         seed_(options.scenes.seed),
-        scene_share_(options.folders.empty() ? 1.0 : options.scene_share) {
+        scene_share_(options.folders.empty() ? 1.0 : options.scene_share),
+        num_scenes_(static_cast<uint64_t>(options.num_scenes)) {
     if (!options.folders.empty())
       folders_.emplace(FolderSampleOptions{options.folders,
                                            options.scenes.width,
@@ -77,13 +77,15 @@ class MixedSamples : public SampleSource {
 
   TrainingSample Get(uint64_t idx) const override {
     RandomStream random(HashKey({seed_, idx, kSourceKey}));
-    return random.Uniform() < scene_share_ ? scenes_.Get(idx) : folders_->Get(idx);
+    if (random.Uniform() >= scene_share_) return folders_->Get(idx);
+    return scenes_.Get(num_scenes_ > 0 ? idx % num_scenes_ : idx);
   }
 
  private:
   SceneSamples scenes_;
   uint64_t seed_;
   double scene_share_;
+  uint64_t num_scenes_;
   std::optional<FolderSamples> folders_;
 };
 
@@ -112,6 +114,7 @@ class ResultSource : public ParameterSource {
 struct Start {
   NetworkDescription network;
   std::optional<Checkpoint> weights;
+  uint64_t fingerprint = 0;
 };
 
 // Which network is trained, and the weights to start from.
@@ -125,6 +128,7 @@ Start FindStart(const TrainOptions& options) {
         AuditWeights(*start.weights, path, ValueCheck::kFinite, options.num_threads);
     RequireComplete(audit, path);
     start.network = audit.description;
+    start.fingerprint = Fingerprint(*start.weights);
   }
   const auto extend = [&](auto& config) {
     if (options.lora_only && !config.lora) config.lora = options.lora;
@@ -132,31 +136,15 @@ Start FindStart(const TrainOptions& options) {
     return config.has_distractor_head;
   };
   const bool is_vgtw = std::visit(extend, start.network.config);
-  const bool is_vggt = std::holds_alternative<VggtConfig>(start.network.config);
+  const auto* vggt = std::get_if<VggtConfig>(&start.network.config);
+  const bool is_vggt = vggt != nullptr;
+  if (options.loss_weights[static_cast<size_t>(TrainingLoss::kPoints)] > 0.0 &&
+      !(is_vggt && vggt->has_point_head)) {
+    throw Error("a points_weight, but the network has no point head, expected --point_head 1");
+  }
   if (is_vgtw) start.network.kind = is_vggt ? NetworkKind::kVgtw : NetworkKind::kVgtwPi3;
   start.network.side_px = options.scenes.width;
   return start;
-}
-
-nlohmann::json AsJson(const TrainingStep& step) {
-  nlohmann::json json = {
-      {"step", step.step}, {"learning_rate", step.learning_rate}, {"loss", step.loss}};
-  for (size_t i = 0; i < kNumTrainingLosses; ++i) json[kTrainingLossNames[i]] = step.losses[i];
-  return json;
-}
-
-nlohmann::json AsJson(const ValidationScore& score) {
-  return {{"step", score.step},
-          {"mask_f1", score.mask_f1},
-          {"mask_iou", score.mask_iou},
-          {"mask_precision", score.mask_precision},
-          {"mask_recall", score.mask_recall},
-          {"abs_rel", score.abs_rel},
-          {"within_1_25", score.within_1_25},
-          {"rotation_deg", score.rotation_deg},
-          {"direction_deg", score.direction_deg},
-          {"pairs_within_5_deg", score.pairs_within_5_deg},
-          {"confidence_ratio", score.confidence_ratio}};
 }
 
 class TrainRun {
@@ -176,7 +164,7 @@ class TrainRun {
                     .max_group_norm = options.max_gradient_norm,
                     .ema_decay = options.ema_decay}),
         samples_(options),
-        held_out_(HeldOut(options.scenes)) {
+        held_out_(HeldOut(options.scenes), options.scene_kind) {
     start_.weights.reset();
     const int num_threads = ResolveThreads(options.num_threads);
     const int num_workers = device_.is_cpu() ? std::min(num_threads, options.samples_per_step) : 1;
@@ -187,18 +175,18 @@ class TrainRun {
   TrainSummary Run(const ProgressCallback& progress) {
     const Clock::time_point start = Clock::now();
     const fs::path state_path = output_path_ / kStateFile;
-    const std::string identity = IdentityOf(options_);
+    const std::string identity = IdentityOf(options_, start_.fingerprint);
     int64_t step =
         ReadTrainingState(state_path, identity, parameters_, optimiser_.moments()).value_or(0);
-    CutLog(output_path_ / kLogFile, step);
-    log_.open(output_path_ / kLogFile, std::ios::app);
+    summary_.validations = CutLog(output_path_ / kTrainingLogFile, step).validations;
+    log_.open(output_path_ / kTrainingLogFile, std::ios::app);
     Clock::time_point last_save = Clock::now();
     const auto save = [&] {
       WriteTrainingState(state_path, parameters_, optimiser_.moments(), step, identity);
       last_save = Clock::now();
     };
     for (; step < options_.num_steps;) {
-      Log(AsJson(Step(step)));
+      Log(LogLine(Step(step)));
       ++step;
       if (progress) progress(step, options_.num_steps);
       if (step % options_.validate_every == 0 || step == options_.num_steps) Validate(step);
@@ -294,12 +282,12 @@ class TrainRun {
     });
     if (scores.empty()) return;
     summary_.validations.push_back(Summarise(scores, step));
-    Log(AsJson(summary_.validations.back()));
+    Log(LogLine(summary_.validations.back()));
   }
 
-  void Log(const nlohmann::json& entry) {
-    log_ << entry.dump() << std::endl;
-    if (!log_) throw Error("cannot write " + (output_path_ / kLogFile).string());
+  void Log(const std::string& line) {
+    log_ << line << std::endl;
+    if (!log_) throw Error("cannot write " + (output_path_ / kTrainingLogFile).string());
   }
 
   const TrainOptions& options_;
@@ -331,7 +319,7 @@ TrainSummary Train(const TrainOptions& options,
 }
 
 void ForgetRun(const fs::path& output_path) {
-  for (const char* name : {kStateFile, kLogFile, kWeightsFile}) {
+  for (const char* name : {kStateFile, kTrainingLogFile, kWeightsFile}) {
     std::error_code error;
     fs::remove(output_path / name, error);
     if (error) Fail(output_path / name, "cannot be removed (" + error.message() + ")", "a file");

@@ -18,10 +18,23 @@
 namespace vgtw {
 
 // What is added up, each with its weight.
-enum class TrainingLoss { kMask, kSuppression, kConsistency, kCamera, kDepth };
-inline constexpr size_t kNumTrainingLosses = 5;
+enum class TrainingLoss {
+  kMask,
+  kSuppression,
+  kConsistency,
+  kCamera,
+  kDepth,
+  kPoints,
+  kCorrespondence
+};
+inline constexpr size_t kNumTrainingLosses = 7;
 inline constexpr std::array<const char*, kNumTrainingLosses> kTrainingLossNames = {
-    "mask", "suppression", "consistency", "camera", "depth"};
+    "mask", "suppression", "consistency", "camera", "depth", "points", "correspondence"};
+
+enum class SceneKind {
+  kVaried,  // scene/scene_stream.h
+  kDemo     // those of `vgtw demo`: scene/demo_scenes.h
+};
 
 // Photos with masks of their distractors (scene/distractor_mask.h: <name>.png, 0 = excluded).
 struct MaskedFolder {
@@ -41,10 +54,12 @@ struct TrainOptions {
   double lora_dropout = 0.05;
 
   // In the order of TrainingLoss; the defaults are the paper's, which has no labels of geometry.
-  std::array<double, kNumTrainingLosses> loss_weights = {0.2, 0.01, 0.05, 0.0, 0.0};
+  std::array<double, kNumTrainingLosses> loss_weights = {0.2, 0.01, 0.05};
 
   // What is learnt from: folders, if there are any, and rendered scenes without end.
   SceneStreamOptions scenes = {};
+  SceneKind scene_kind = SceneKind::kVaried;
+  int num_scenes = 0;        // that are rendered, over and over; 0 = never the same
   double scene_share = 0.0;  // of the samples, beside folders
   std::vector<MaskedFolder> folders;
 

@@ -3,6 +3,7 @@
 
 #include "network/camera_geometry.h"
 #include "network/config.h"
+#include "network/correspondence_loss.h"
 #include "network/distractor_losses.h"
 
 #include <cstddef>
@@ -59,10 +60,19 @@ SampleLoss ComputeSampleLoss(const Model& model,
     const at::Tensor steps = model.PredictCameras(features).pose_encodings;
     sum.Add(TrainingLoss::kCamera, CameraLoss(steps.unbind(0), true_encodings));
   }
-  const MapChoice maps = {.points = false,
+  if (sum.Wants(TrainingLoss::kCorrespondence) && normalised) {
+    const PatchMatches matches = MatchPatches(normalised->truth, sample.distractor);
+    at::Tensor loss;
+    for (const at::Tensor& layer : features.layers) {
+      const at::Tensor of_layer = CorrespondenceLoss(layer.slice(1, kNumSpecialTokens), matches);
+      loss = loss.defined() ? loss + of_layer : of_layer;
+    }
+    sum.Add(TrainingLoss::kCorrespondence, loss / static_cast<double>(features.layers.size()));
+  }
+  const MapChoice maps = {.points = sum.Wants(TrainingLoss::kPoints) && normalised.has_value(),
                           .depth = sum.Wants(TrainingLoss::kDepth) && normalised.has_value(),
                           .distractor = sum.Wants(TrainingLoss::kMask)};
-  if (!maps.depth && !maps.distractor) return sum.Result();
+  if (!maps.points && !maps.depth && !maps.distractor) return sum.Result();
   const DenseOutputs outputs = model.PredictMaps(features, 0, num_views, maps);
   if (maps.distractor) {
     sum.Add(TrainingLoss::kMask, MaskLoss(outputs.distractor_logits, sample.distractor));
@@ -70,6 +80,10 @@ SampleLoss ComputeSampleLoss(const Model& model,
   if (maps.depth) {
     sum.Add(TrainingLoss::kDepth,
             DepthLoss(outputs.depth, outputs.depth_conf, normalised->truth.depth));
+  }
+  if (maps.points) {
+    sum.Add(TrainingLoss::kPoints,
+            PointLoss(outputs.points, outputs.points_conf, normalised->truth));
   }
   return sum.Result();
 }

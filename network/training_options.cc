@@ -61,6 +61,7 @@ void TrainOptions::Check() const {
                std::string(kTrainingLossNames[i]) + "_weight = " + std::to_string(loss_weights[i]));
   }
   CheckShare(scene_share, "scene_share");
+  VGTW_CHECK(num_scenes >= 0, "num_scenes = " + std::to_string(num_scenes));
   VGTW_CHECK(num_steps > 0, "num_steps = " + std::to_string(num_steps));
   VGTW_CHECK(samples_per_step > 0, "samples_per_step = " + std::to_string(samples_per_step));
   CheckPositive(learning_rate, "learning_rate");
@@ -82,14 +83,12 @@ LearningRateSchedule ScheduleOf(const TrainOptions& options) {
           .num_steps = options.num_steps};
 }
 
-std::string IdentityOf(const TrainOptions& options) {
-  json weights = json::array();
-  for (const auto& file : options.weights) weights.push_back(file.string());
+std::string IdentityOf(const TrainOptions& options, uint64_t start) {
   json folders = json::array();
   for (const MaskedFolder& folder : options.folders) {
     folders.push_back({folder.image_path.string(), folder.mask_path.string()});
   }
-  const json identity = {{"weights", weights},
+  const json identity = {{"start", start},
                          {"sizes", SizesAsJson(options.sizes)},
                          {"weights_seed", options.weights_seed},
                          {"lora_only", options.lora_only},
@@ -98,6 +97,8 @@ std::string IdentityOf(const TrainOptions& options) {
                          {"loss_weights", options.loss_weights},
                          {"scenes", ScenesAsJson(options.scenes)},
                          {"scene_share", options.scene_share},
+                         {"scene_kind", options.scene_kind},
+                         {"num_scenes", options.num_scenes},
                          {"folders", folders},
                          {"samples_per_step", options.samples_per_step},
                          {"learning_rate", options.learning_rate},

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include <ATen/ATen.h>
-#include <nlohmann/json.hpp>
 
 namespace vgtw {
 namespace {
@@ -173,21 +172,6 @@ void WriteTrainedWeights(const fs::path& path,
     file.Add(parameter.name, moments.mean.empty() ? parameter.value : moments.mean[i]);
   }
   file.Write(path, SizesOf(network));
-}
-
-void CutLog(const fs::path& path, int64_t num_steps_done) {
-  if (!fs::exists(path)) return;
-  std::istringstream lines(ReadFile(path));
-  std::string kept;
-  for (std::string line; std::getline(lines, line);) {
-    const auto entry = nlohmann::json::parse(line, nullptr, /*allow_exceptions=*/false);
-    if (!entry.is_object() || !entry.contains("step") || !entry["step"].is_number()) continue;
-    // A step is counted from 0, a validation by the steps before it.
-    const bool is_validation = entry.contains("mask_f1");
-    const int64_t last = is_validation ? num_steps_done : num_steps_done - 1;
-    if (entry["step"].get<int64_t>() <= last) kept += line + "\n";
-  }
-  WriteFileAtomically(path, kept);
 }
 
 }  // namespace vgtw

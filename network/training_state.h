@@ -35,7 +35,4 @@ void WriteTrainedWeights(const std::filesystem::path& path,
                          const TrainedParameters& parameters,
                          const AdamW::Moments& moments);
 
-// Takes out of a log what a killed run wrote after its last state.
-void CutLog(const std::filesystem::path& path, int64_t num_steps_done);
-
 }  // namespace vgtw

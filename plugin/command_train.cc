@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/training_folders.h"
 #include "network/train.h"
+#include "network/training_log.h"
 #include "plugin/commands.h"
 #include "plugin/network_commands.h"
 #include "plugin/progress.h"
 #include "plugin/table.h"
+#include "plugin/training_curves.h"
 #include "scene/error.h"
+#include "scene/files.h"
 
 #include <filesystem>
 #include <memory>
@@ -26,6 +29,7 @@ struct TrainCommand {
   fs::path image_path;
   fs::path mask_path;
   std::string trains = "lora";
+  std::string scenes = "varied";
   std::string precision = "fp32";
   int num_steps = 1000;
   int validate_every = 500;
@@ -48,6 +52,7 @@ struct TrainCommand {
     resolved.num_steps = num_steps;
     resolved.validate_every = validate_every;
     resolved.lora_only = trains == "lora";
+    resolved.scene_kind = scenes == "demo" ? SceneKind::kDemo : SceneKind::kVaried;
     resolved.lora.rank = lora_rank;
     resolved.bfloat16 = precision == "bf16";
     for (const fs::path& path : {weights_path, lora_path}) {
@@ -103,14 +108,21 @@ struct TrainCommand {
   void Run() {
     Apply(usability);
     const TrainOptions resolved = Options();
-    if (overwrite) ForgetRun(output_path);
+    if (overwrite) {
+      ForgetRun(output_path);
+      fs::remove(CurvesPath());
+    }
     TrainSummary summary;
     {
       ProgressDisplay display("steps");
       summary = Train(resolved, output_path, display.Callback());
     }
+    const std::string curves = DrawTrainingCurves(ReadTrainingLog(output_path / kTrainingLogFile));
+    if (!curves.empty()) WriteFileAtomically(CurvesPath(), curves);
     Finish(usability, Text(summary), Json(summary));
   }
+
+  fs::path CurvesPath() const { return output_path / "curves.svg"; }
 
   std::string Text(const TrainSummary& summary) const {
     std::vector<std::vector<std::string>> table = {{"steps",
@@ -139,7 +151,8 @@ struct TrainCommand {
            std::to_string(summary.num_steps) + " steps, " + std::to_string(summary.num_trained) +
            " parameters, " + FormatNumber(summary.seconds, 0) + " s, peak memory " +
            FormatNumber(summary.peak_memory_gib, 2) +
-           " GiB\nwritten: " + (output_path / "weights.safetensors").string() + "\n";
+           " GiB\nwritten: " + (output_path / "weights.safetensors").string() + ", " +
+           CurvesPath().string() + "\n";
   }
 
   json Json(const TrainSummary& summary) const {
@@ -199,6 +212,13 @@ struct TrainCommand {
         .Add("scene_share",
              &options.scene_share,
              "Share of rendered scenes beside photos; without photos all are")
+        .AddChoice("scenes",
+                   &scenes,
+                   {"varied", "demo"},
+                   "Rendered scenes: of all kinds, or like those of `vgtw demo`")
+        .Add("num_scenes",
+             &options.num_scenes,
+             "That are rendered, over and over; 0 = never the same twice")
         .Add("width", &options.scenes.width, "Of the network's images, pixels, a multiple of 14")
         .Add("height", &options.scenes.height, "Likewise")
         .Add("min_views", &options.scenes.min_views, "Views of a sample, at least")

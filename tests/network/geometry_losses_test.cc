@@ -178,7 +178,7 @@ TEST(DepthLoss, IsTheSumOfItsParts) {
   const at::Tensor confidence = at::full({1, 1, 4}, 2.0, at::kDouble);
   const double regression = (2.0 * (0.5 + 0.5) - 3.0 * 0.2 * std::log(2.0)) / 3.0;
   const auto loss = [&](double weight, int num_scales) {
-    const DepthLossOptions options = {.gradient_weight = weight, .num_gradient_scales = num_scales};
+    const MapLossOptions options = {.gradient_weight = weight, .num_gradient_scales = num_scales};
     return DepthLoss(depth, confidence, truth, options).item<double>();
   };
   EXPECT_NEAR(loss(1.0, 0), regression, 1e-15);
@@ -223,6 +223,35 @@ TEST(DepthLoss, GradientsAreThoseOfDifferences) {
   EXPECT_LT(
       GradientError([&](const at::Tensor& x) { return DepthLoss(depth, x, truth); }, confidence),
       1e-7);
+}
+
+TEST(PointLoss, IsZeroAtTheTruthButForTheConfidence) {
+  at::manual_seed(4);
+  const GeometryTruth truth = RandomTruth(3);
+  const at::Tensor is_known = IsKnownDepth(truth.depth);
+  const at::Tensor points = Unproject(truth.depth.masked_fill(is_known.logical_not(), 0.0),
+                                      {truth.cam_from_world, truth.intrinsics});
+  const at::Tensor certain = at::ones_like(truth.depth);
+  const LossFunction by_points = [&](const at::Tensor& x) { return PointLoss(x, certain, truth); };
+  EXPECT_NEAR(by_points(points).item<double>(), 0.0, 1e-12);
+  EXPECT_NEAR(GradientOf(by_points, points).abs().max().item<double>(), 0.0, 1e-12);
+  // Two of three coordinates are right.
+  at::Tensor beside = points.clone();
+  beside.select(3, 1).add_(0.3);
+  EXPECT_NEAR(by_points(beside).item<double>(), 0.1, 1e-9);
+}
+
+TEST(PointLoss, GradientsAreThoseOfDifferences) {
+  at::manual_seed(5);
+  const GeometryTruth truth = RandomTruth(2);
+  const at::Tensor points = at::randn({2, 6, 8, 3}, at::kDouble);
+  const at::Tensor confidence = 1.0 + at::rand({2, 6, 8}, at::kDouble);
+  EXPECT_LT(
+      GradientError([&](const at::Tensor& x) { return PointLoss(x, confidence, truth); }, points),
+      1e-6);
+  EXPECT_LT(
+      GradientError([&](const at::Tensor& x) { return PointLoss(points, x, truth); }, confidence),
+      1e-6);
 }
 
 TEST(DepthLoss, OfNothingKnownIsZero) {

@@ -45,7 +45,7 @@ double MedianMisfit(const TrainingSample& sample) {
 }
 
 TEST(SceneSamples, GeometryIsConsistentBetweenViews) {
-  const SceneSamples samples(Small());
+  const SceneSamples samples(Small(), SceneKind::kVaried);
   for (uint64_t idx = 0; idx < 8; ++idx) {
     // Neighbouring pixels of 56 x 42 differ in depth by about 2 %; wrong poses give tens.
     EXPECT_LT(MedianMisfit(samples.Get(idx)), 0.03) << idx;
@@ -53,7 +53,7 @@ TEST(SceneSamples, GeometryIsConsistentBetweenViews) {
 }
 
 TEST(SceneSamples, AreAFunctionOfTheIndex) {
-  const SceneSamples samples(Small());
+  const SceneSamples samples(Small(), SceneKind::kVaried);
   TrainingSample other;
   std::thread thread([&] { other = samples.Get(5); });
   const TrainingSample sample = samples.Get(5);
@@ -67,7 +67,7 @@ TEST(SceneSamples, AreAFunctionOfTheIndex) {
 }
 
 TEST(SceneSamples, SkyHasNoDepth) {
-  const SceneSamples samples(Small());
+  const SceneSamples samples(Small(), SceneKind::kVaried);
   bool has_unknown = false;
   for (uint64_t idx = 0; idx < 16; ++idx) {
     const at::Tensor depth = samples.Get(idx).truth.depth;

@@ -2,6 +2,8 @@
 #include "network/train.h"
 
 #include "network/checkpoint.h"
+#include "network/scene_samples.h"
+#include "network/validation.h"
 #include "network/weights.h"
 #include "scene/error.h"
 #include "scene/files.h"
@@ -82,6 +84,39 @@ TEST(Train, LowersTheLossOfANewNetwork) {
   EXPECT_LT(after.rotation_deg, before.rotation_deg + 1.0);
 }
 
+// A LoRA and a distractor head learn two scenes by heart, on weights that have learnt nothing.
+TEST(Train, OverfitsMasksOfTwoScenes) {
+  const TemporaryFolder folder;
+  TrainOptions base = ShortRun(/*lora_only=*/false);
+  base.sizes.dim = 32;
+  base.sizes.dpt = {.num_features = 16, .num_channels = {16, 16, 32, 32}};
+  base.num_steps = 1;
+  base.num_validation_scenes = 0;
+  Train(base, folder / "base");
+  TrainOptions options = base;
+  options.lora_only = true;
+  options.weights = {folder / "base" / "weights.safetensors"};
+  options.lora = {.rank = 8, .alpha = 16.0};
+  options.lora_dropout = 0.0;
+  options.loss_weights = {1.0, 0.01, 0.05};
+  options.scene_kind = SceneKind::kDemo;
+  options.num_scenes = 2;
+  options.scenes.width = 56;
+  options.scenes.height = 42;
+  options.scenes.min_views = options.scenes.max_views = 3;
+  options.num_steps = 500;
+  options.learning_rate = 5e-3;
+  options.num_threads = 0;
+  Train(options, folder / "lora");
+  const LoadedNetwork network =
+      LoadNetwork({options.weights.front(), folder / "lora" / "weights.safetensors"}, {});
+  const SceneSamples samples(options.scenes, options.scene_kind);
+  const ValidationScore score = Summarise(
+      {ScoreSample(*network.model, samples.Get(0)), ScoreSample(*network.model, samples.Get(1))},
+      options.num_steps);
+  EXPECT_GT(score.mask_iou, 0.95);
+}
+
 TEST(Train, RefusesToGoOnWithOtherOptions) {
   const TemporaryFolder folder;
   TrainOptions options = ShortRun(/*lora_only=*/false);
@@ -95,6 +130,34 @@ TEST(Train, RefusesToGoOnWithOtherOptions) {
   EXPECT_TRUE(fs::is_empty(folder / "run"));
   Train(options, folder / "run");
   EXPECT_TRUE(ReadFile(folder / "run" / "weights.safetensors") != weights);
+}
+
+TEST(Train, RefusesToGoOnOverOtherWeights) {
+  const TemporaryFolder folder;
+  TrainOptions base = ShortRun(/*lora_only=*/false);
+  base.num_steps = 1;
+  Train(base, folder / "base");
+  TrainOptions extension = ShortRun(/*lora_only=*/true);
+  extension.weights = {folder / "base" / "weights.safetensors"};
+  Train(extension, folder / "lora");
+  ForgetRun(folder / "base");
+  base.weights_seed = 5;
+  Train(base, folder / "base");
+  EXPECT_THROW(Train(extension, folder / "lora"), Error);
+}
+
+// The summary of a run that went on tells of all its validations.
+TEST(Train, ResumedRunKnowsItsPast) {
+  const TemporaryFolder folder;
+  TrainOptions options = ShortRun(/*lora_only=*/false);
+  options.decay_share = options.warmup_share = 0.0;  // or the rate would depend on num_steps
+  options.num_steps = 3;
+  Train(options, folder / "run");
+  options.num_steps = 6;
+  const TrainSummary summary = Train(options, folder / "run");
+  ASSERT_EQ(summary.validations.size(), 2u);
+  EXPECT_EQ(summary.validations[0].step, 3);
+  EXPECT_EQ(summary.validations[1].step, 6);
 }
 
 TEST(Train, LossThatIsNotFiniteIsAnError) {

@@ -26,9 +26,10 @@ class SampleLossTest : public testing::Test {
     scenes.width = 42;
     scenes.height = 28;
     scenes.max_views = 3;
-    sample_ = SceneSamples(scenes).Get(1);
+    sample_ = SceneSamples(scenes, SceneKind::kVaried).Get(1);
     auto& config = std::get<VggtConfig>(network_.config);
     config.has_distractor_head = true;
+    config.has_point_head = true;
     parameters_.emplace(network_, nullptr, TrainedParts::kAll, 1, at::Device(at::kCPU));
     leaves_.emplace(*parameters_);
     model_.emplace(ParameterScope(*leaves_), config);
@@ -46,7 +47,7 @@ class SampleLossTest : public testing::Test {
 };
 
 TEST_F(SampleLossTest, IsTheWeightedSum) {
-  const Weights weights = {0.2, 0.3, 0.5, 0.7, 1.1};
+  const Weights weights = {0.2, 0.3, 0.5, 0.7, 1.1, 0.6, 0.4};
   const SampleLoss loss = Loss(weights);
   double sum = 0.0;
   for (size_t i = 0; i < kNumTrainingLosses; ++i) {
@@ -60,7 +61,7 @@ TEST_F(SampleLossTest, IsTheWeightedSum) {
 }
 
 TEST_F(SampleLossTest, OfMasksDoesNotReachOtherHeads) {
-  torch::autograd::backward({Loss({1.0, 0.0, 0.0, 0.0, 0.0}).total}, {});
+  torch::autograd::backward({Loss({1.0}).total}, {});
   for (size_t i = 0; i < parameters_->all().size(); ++i) {
     if (parameters_->all()[i].group != ParameterGroup::kHeads) continue;
     EXPECT_FALSE(leaves_->leaves()[i].grad().defined()) << parameters_->all()[i].name;
@@ -68,17 +69,16 @@ TEST_F(SampleLossTest, OfMasksDoesNotReachOtherHeads) {
 }
 
 TEST_F(SampleLossTest, WithoutGeometryIsOfMasksAlone) {
-  const double mask = Loss({1.0, 0.0, 0.0, 0.0, 0.0}).values[0];
+  const double mask = Loss({1.0}).values[0];
   sample_.truth = {};
-  const SampleLoss loss = Loss({1.0, 0.0, 0.0, 1.0, 1.0});
+  const SampleLoss loss = Loss({1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0});
   EXPECT_EQ(loss.values[0], mask);
-  EXPECT_EQ(loss.values[3], 0.0);
-  EXPECT_EQ(loss.values[4], 0.0);
+  for (size_t i = 3; i < kNumTrainingLosses; ++i) EXPECT_EQ(loss.values[i], 0.0);
 }
 
 // Along the gradient the loss falls as fast as the gradient says.
 TEST_F(SampleLossTest, FallsAlongItsGradient) {
-  const Weights weights = {0.2, 0.0, 0.0, 1.0, 1.0};
+  const Weights weights = {0.2, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0};
   const SampleLoss loss = Loss(weights);
   torch::autograd::backward({loss.total}, {});
   double slope = 0.0;

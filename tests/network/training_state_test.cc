@@ -93,16 +93,5 @@ TEST_F(TrainingState, ThatLacksATensorChangesNothing) {
   EXPECT_TRUE(at::equal(before, other.parameters.all()[0].value));
 }
 
-TEST_F(TrainingState, LogLosesWhatCameAfterIt) {
-  const std::filesystem::path path = folder_ / "log.jsonl";
-  WriteFileAtomically(path,
-                      "{\"step\":0,\"loss\":1}\n{\"step\":1,\"loss\":1}\n"
-                      "{\"step\":2,\"mask_f1\":0.5}\n{\"step\":2,\"loss\":1}\n"
-                      "{\"step\":3,\"mask_f1\":0.5}\n{\"step\":3,\"lo");
-  CutLog(path, 2);
-  EXPECT_EQ(ReadFile(path),
-            "{\"step\":0,\"loss\":1}\n{\"step\":1,\"loss\":1}\n{\"step\":2,\"mask_f1\":0.5}\n");
-}
-
 }  // namespace
 }  // namespace vgtw

@@ -15,7 +15,7 @@ set(folders_of_examples examples scene network matching bridge refine evaluation
 set(folders_of_network_program ${folders_of_plugin} network)
 set(network_program plugin/command_predict.cc plugin/command_probe.cc plugin/command_train.cc
     plugin/command_weights.cc plugin/network_flags.cc plugin/network_flags.h
-    plugin/network_main.cc)
+    plugin/network_main.cc plugin/training_curves.cc plugin/training_curves.h)
 
 set(heavy_libraries torch ceres opencv sqlite pcl zip json cli deflate exif openssl)
 set(pattern_of_torch "^(torch|ATen|c10)/")
