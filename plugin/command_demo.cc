@@ -23,6 +23,8 @@ std::string NumRefined(const PipelineReport& report) {
 struct DemoCommand {
   DemoOptions options;
   RunFlags run_flags;
+  std::filesystem::path weights_path;
+  std::filesystem::path lora_path;
   std::string path = "orbit";
   uint64_t seed = 0;
   bool overwrite = false;
@@ -36,6 +38,13 @@ struct DemoCommand {
     }
     if (path == "forward") options.scene.path = CameraPath::kForward;
     if (path == "grid") options.scene.path = CameraPath::kGrid;
+    if (!weights_path.empty()) options.weights = {weights_path};
+    if (!lora_path.empty()) {
+      if (weights_path.empty()) {
+        throw Error("--lora_path without --weights_path, expected the weights that it belongs to");
+      }
+      options.weights.push_back(lora_path);
+    }
     options.scene.seed = seed;
     options.perturb.seed = seed;
     options.scene.num_threads = usability.num_threads;
@@ -82,7 +91,10 @@ struct DemoCommand {
                 row("  of the feed-forward poses",
                     rotation(without.report.feedforward_error),
                     rotation(with.report.feedforward_error))}) +
-           "Against exact truth: centres RMSE after Sim3 alignment, rotations median over "
+           "Predicted masks: IoU " + FormatNumber(report.mask_pixels.IoU(), 3) + ", precision " +
+           FormatNumber(report.mask_pixels.Precision(), 3) + ", recall " +
+           FormatNumber(report.mask_pixels.Recall(), 3) +
+           "\nAgainst exact truth: centres RMSE after Sim3 alignment, rotations median over "
            "pairs.\n" +
            NextCommands();
   }
@@ -112,7 +124,11 @@ struct DemoCommand {
       return object;
     };
     return {{"with_masks", run_as_json(report.with_masks)},
-            {"without_masks", run_as_json(report.without_masks)}};
+            {"without_masks", run_as_json(report.without_masks)},
+            {"predicted_masks",
+             {{"iou", report.mask_pixels.IoU()},
+              {"precision", report.mask_pixels.Precision()},
+              {"recall", report.mask_pixels.Recall()}}}};
   }
 };
 
@@ -134,7 +150,12 @@ std::function<void()> DeclareDemo(Flags& flags) {
       .Add("image_noise", &scene.image_noise, "Sigma of noise, grey levels of 255")
       .Add("exposure_change", &scene.exposure_change, "Sigma of the log gain per photo")
       .Add("seed", &command->seed, "Seed of scene and prediction errors");
-  flags.Group("Errors of the feed-forward prediction")
+  flags.Group("Network")
+      .Add("weights_path",
+           &command->weights_path,
+           "Weights that look at the photos; none = the truth with errors is the prediction")
+      .Add("lora_path", &command->lora_path, "LoRA and distractor head over these weights");
+  flags.Group("Errors of the feed-forward prediction, without a network")
       .Add("rotation_deg", &perturb.rotation_deg, "Sigma of rotations, degrees")
       .Add("centre_percent", &perturb.centre_percent, "Camera centres, % of the camera extent")
       .Add("focal_percent", &perturb.focal_percent, "Sigma of focal lengths, %")

@@ -8,7 +8,11 @@
 #include "plugin/comparison.h"
 #include "plugin/comparison_pictures.h"
 #include "plugin/contact_sheet.h"
+#include "plugin/mask_scores.h"
+#include "plugin/network_program.h"
 #include "plugin/progress.h"
+#include "plugin/subprocess.h"
+#include "scene/error.h"
 #include "scene/image_io.h"
 #include "scene/parallel.h"
 
@@ -60,9 +64,48 @@ void WriteScene(const DemoOptions& options) {
   WriteModelOptions overwrite;
   overwrite.overwrite = true;
   WriteModel(TrueModel(scene.views()), out / "truth" / "sparse", overwrite);
-  WritePrediction(Perturb(MakeTruePrediction(scene), options.perturb),
-                  out / "predictions",
-                  /*overwrite=*/true);
+  if (options.weights.empty()) {
+    WritePrediction(Perturb(MakeTruePrediction(scene), options.perturb),
+                    out / "predictions",
+                    /*overwrite=*/true);
+  }
+}
+
+// Runs `vgtw predict` in a process of its own, as LibTorch lives there.
+void PredictByNetwork(const DemoOptions& options) {
+  const fs::path& out = options.output_path;
+  std::vector<std::string> arguments = {"predict",
+                                        "--image_path",
+                                        (out / "photos").string(),
+                                        "--output_path",
+                                        (out / "predictions").string(),
+                                        "--overwrite",
+                                        "--threads",
+                                        std::to_string(options.pipeline.num_threads),
+                                        "--weights_path",
+                                        options.weights.front().string()};
+  if (options.weights.size() > 1) {
+    arguments.insert(arguments.end(), {"--lora_path", options.weights[1].string()});
+  }
+  Announce("predicting poses, depths and masks by the network");
+  const fs::path program = FindNetworkProgram();
+  if (program.empty()) throw Error("vgtw-network is not installed, expected it beside vgtw");
+  PrepareNetworkEnvironment();
+  const SubprocessResult run = RunSubprocess(program, arguments, out / "predict.log");
+  if (run.exit_code != 0) {
+    throw Error("vgtw predict ended with " + std::to_string(run.exit_code) + ": " +
+                Printable(run.output));
+  }
+}
+
+PixelCounts ComparePixels(const DemoOptions& options) {
+  MaskScoresOptions scores;
+  scores.predictions_path = options.output_path / "predictions";
+  scores.reference_mask_path = options.output_path / "truth" / "masks";
+  scores.num_threads = options.pipeline.num_threads;
+  MaskScore sum;
+  for (const ImageMaskScore& image : ScoreMasks(scores)) sum += image.score;
+  return sum.pixels;
 }
 
 DemoRun RunOnce(const DemoOptions& options, bool use_masks) {
@@ -137,7 +180,9 @@ void WriteReport(const DemoOptions& options) {
 
 DemoReport RunDemo(const DemoOptions& options) {
   WriteScene(options);
+  if (!options.weights.empty()) PredictByNetwork(options);
   DemoReport report;
+  report.mask_pixels = ComparePixels(options);
   report.with_masks = RunOnce(options, /*use_masks=*/true);
   report.without_masks = RunOnce(options, /*use_masks=*/false);
   DrawContactSheet(options);

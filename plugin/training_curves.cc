@@ -151,7 +151,7 @@ void Draw(const Panel& panel, std::ostream& svg) {
         << "\"/>\n";
     Text(kLeft - 6, y + 4, "tick", Shortest(tick), svg);
   }
-  Text(right, kPanelHeight - kBottom + 18, "tick", "step " + Shortest(last_step), svg);
+  Text(right, kPanelHeight - kBottom + 18, "tick", "step " + FormatNumber(last_step, 0), svg);
   svg << "<polyline points=\"";
   for (const Point& point : panel.points) {
     svg << FormatNumber(x_of(point.step), 1) << ',' << FormatNumber(axis.Pixel(point.value), 1)

@@ -27,6 +27,9 @@ TEST(Demo, MasksRemoveDistractorPointsAndImprovePoses) {
   EXPECT_GT(without["points_on_distractors"].get<int>(), 50);
   EXPECT_LT(with["refined_error"]["centre_rmse_percent"].get<double>(),
             without["refined_error"]["centre_rmse_percent"].get<double>());
+  // One outline in network pixels wrong, as the demo makes it.
+  EXPECT_GT(report["predicted_masks"]["iou"].get<double>(), 0.7);
+  EXPECT_LT(report["predicted_masks"]["iou"].get<double>(), 1.0);
   // Refinement pays: at least twice as good as what it started from.
   EXPECT_LT(with["refined_error"]["centre_rmse_percent"].get<double>(),
             0.5 * with["feedforward_error"]["centre_rmse_percent"].get<double>());
