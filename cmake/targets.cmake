@@ -17,7 +17,8 @@ endfunction()
 
 # vgtw_precompile(TARGET HEADER...) or (TARGET REUSE_FROM OTHER), with VGTW_PRECOMPILE only: what nearly
 # every source includes is parsed once, which halves the time to compile. Not by default, because a
-# missing #include then goes unnoticed and ccache has to be told.
+# missing #include then goes unnoticed (doors are verified without) and ccache has to be told
+# (scripts/build).
 function(vgtw_precompile target)
   if(NOT VGTW_PRECOMPILE)
     return()
@@ -27,14 +28,17 @@ function(vgtw_precompile target)
     target_precompile_headers(${target} PRIVATE
       <Eigen/Geometry> <algorithm> <array> <cmath> <filesystem> <fstream> <functional> <map>
       <optional> <random> <set> <span> <sstream> <string> <unordered_map> <vector> ${ARGN})
+    # What ccache asks of GCC's.
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)
   endif()
 endfunction()
 
-# vgtw_add_library(scene HEADERS a.h ... SOURCES a.cc ... [PUBLIC lib ...] [PRIVATE lib ...])
+# vgtw_add_library(scene HEADERS a.h ... SOURCES a.cc ... [PUBLIC lib ...] [PRIVATE lib ...]
+#                  [PRECOMPILE <header> ...])
 # makes vgtw::scene, which is also the component `scene` of the installed package.
 # HEADERS are the folder's doors: they are installed, must stand alone and include nothing heavy.
 function(vgtw_add_library name)
-  cmake_parse_arguments(ARG "" "" "HEADERS;SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "HEADERS;SOURCES;PUBLIC;PRIVATE;PRECOMPILE" ${ARGN})
   set(target vgtw_${name})
   add_library(${target} STATIC ${ARG_SOURCES})
   add_library(vgtw::${name} ALIAS ${target})
@@ -44,7 +48,7 @@ function(vgtw_add_library name)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   vgtw_compile_options(${target})
-  vgtw_precompile(${target})
+  vgtw_precompile(${target} ${ARG_PRECOMPILE})
   set_property(GLOBAL APPEND PROPERTY VGTW_COMPONENTS ${name})
   install(TARGETS ${target} EXPORT vgtw_${name}
           FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vgtw)
