@@ -2,6 +2,7 @@
 #include "bridge/training_folders.h"
 #include "plugin/commands.h"
 #include "plugin/json_number.h"
+#include "plugin/lint_text.h"
 #include "plugin/progress.h"
 #include "plugin/table.h"
 #include "scene/error.h"
@@ -14,15 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-std::string Plural(size_t count, const std::string& noun) {
-  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
-}
-
-const char* Word(LintSeverity severity) {
-  if (severity == LintSeverity::kError) return "error";
-  return severity == LintSeverity::kWarning ? "warning" : "note";
-}
 
 // What a table calls a scene that has no folder of its own.
 std::string NameOf(const TrainingScene& scene) { return scene.name.empty() ? "." : scene.name; }
@@ -42,12 +34,6 @@ struct DatasetFolders {
   }
   std::vector<TrainingScene> Scenes() const { return FindTrainingScenes(image_path, mask_path); }
 };
-
-void DeclareNetworkSize(Flags& flags, TrainingFolderOptions& options) {
-  flags.Group("Network")
-      .Add("width", &options.width, "Of the network's images, pixels, a multiple of 14")
-      .Add("height", &options.height, "Likewise");
-}
 
 struct DatasetCheckCommand {
   DatasetFolders folders;
@@ -87,49 +73,33 @@ struct DatasetCheckCommand {
                       std::to_string(check.Count(LintSeverity::kError)),
                       std::to_string(check.Count(LintSeverity::kWarning))});
     }
-    std::string text = FormatTable(rows);
-    for (const LintRule& rule : TrainingRules()) text += FindingsText(checks, rule);
     const size_t num_errors = Count(checks, LintSeverity::kError);
-    return text + Plural(checks.size(), "scene") + ": " +
+    return FormatTable(rows) + FindingsText(TrainingRules(), Findings(checks)) +
+           Plural(checks.size(), "scene") + ": " +
            (num_errors == 0 ? "can be trained on, " : Plural(num_errors, "error") + ", ") +
            Plural(Count(checks, LintSeverity::kWarning), "warning") + "\n";
   }
 
-  // "" where the rule has no finding.
-  static std::string FindingsText(const std::vector<SceneCheck>& checks, const LintRule& rule) {
-    constexpr size_t kMaxShown = 20;
-    std::string lines;
-    size_t count = 0;
+  // Named by scene, as the rules of all scenes are told together.
+  static std::vector<LintFinding> Findings(const std::vector<SceneCheck>& checks) {
+    std::vector<LintFinding> findings;
     for (const SceneCheck& check : checks) {
-      for (const LintFinding& finding : check.findings) {
-        if (finding.rule != &rule || count++ >= kMaxShown) continue;
-        lines += "  " + NameOf(check.scene) + (finding.name.empty() ? "" : "/" + finding.name) +
-                 (finding.detail.empty() ? "" : ": " + finding.detail) + "\n";
+      for (LintFinding finding : check.findings) {
+        finding.name = NameOf(check.scene) + (finding.name.empty() ? "" : "/" + finding.name);
+        findings.push_back(std::move(finding));
       }
     }
-    if (count == 0) return "";
-    if (count > kMaxShown) {
-      lines += "  and " + std::to_string(count - kMaxShown) + " more (all with --json)\n";
-    }
-    return std::string(Word(rule.severity)) + " " + std::string(rule.code) + ": " +
-           std::string(rule.meaning) + "; to do: " + std::string(rule.advice) + "\n" + lines;
+    return findings;
   }
 
   static json Json(const std::vector<SceneCheck>& checks) {
     json scenes = json::array();
     for (const SceneCheck& check : checks) {
-      json findings = json::array();
-      for (const LintFinding& finding : check.findings) {
-        findings.push_back({{"code", finding.rule->code},
-                            {"severity", Word(finding.rule->severity)},
-                            {"name", finding.name},
-                            {"detail", finding.detail}});
-      }
       scenes.push_back({{"name", check.scene.name},
                         {"num_photos", check.num_photos},
                         {"num_masks", check.num_masks},
                         {"distractor_share", NumberOrNull(check.distractor_share)},
-                        {"findings", findings}});
+                        {"findings", FindingsJson(check.findings)}});
     }
     return {{"scenes", scenes},
             {"num_errors", Count(checks, LintSeverity::kError)},
@@ -259,22 +229,25 @@ struct DatasetCorruptCommand {
   }
 };
 
-}  // namespace
-
-std::function<void()> DeclareDatasetCheck(Flags& flags) {
-  const auto command = std::make_shared<DatasetCheckCommand>();
+template <typename Command>
+std::function<void()> DeclareAtNetworkSize(Flags& flags) {
+  const auto command = std::make_shared<Command>();
   command->folders.Declare(flags);
-  DeclareNetworkSize(flags, command->options);
+  flags.Group("Network")
+      .Add("width", &command->options.width, "Of the network's images, pixels, a multiple of 14")
+      .Add("height", &command->options.height, "Likewise");
   AddUsability(flags, command->usability);
   return [command] { command->Run(); };
 }
 
+}  // namespace
+
+std::function<void()> DeclareDatasetCheck(Flags& flags) {
+  return DeclareAtNetworkSize<DatasetCheckCommand>(flags);
+}
+
 std::function<void()> DeclareDatasetStats(Flags& flags) {
-  const auto command = std::make_shared<DatasetStatsCommand>();
-  command->folders.Declare(flags);
-  DeclareNetworkSize(flags, command->options);
-  AddUsability(flags, command->usability);
-  return [command] { command->Run(); };
+  return DeclareAtNetworkSize<DatasetStatsCommand>(flags);
 }
 
 std::function<void()> DeclareDatasetCorrupt(Flags& flags) {

@@ -2,6 +2,8 @@
 #include "bridge/mask_lint.h"
 #include "plugin/colmap.h"
 #include "plugin/commands.h"
+#include "plugin/json_number.h"
+#include "plugin/lint_text.h"
 #include "plugin/progress.h"
 #include "plugin/table.h"
 #include "scene/error.h"
@@ -15,15 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-const char* Word(LintSeverity severity) {
-  if (severity == LintSeverity::kError) return "error";
-  return severity == LintSeverity::kWarning ? "warning" : "note";
-}
-
-std::string Plural(size_t count, const std::string& noun) {
-  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
-}
 
 // "2 errors, 1 warning, 0 notes"
 std::string Counts(const LintReport& report) {
@@ -49,8 +42,6 @@ std::string MaskText(const LintImage& image) {
   const size_t num_more = image.mask_names.size() - 1;
   return image.mask_names.front() + (num_more > 0 ? " +" + std::to_string(num_more) : "");
 }
-
-json Json(double value) { return std::isnan(value) ? json(nullptr) : json(value); }
 
 struct MaskLintCommand {
   fs::path image_path;
@@ -150,29 +141,7 @@ struct MaskLintCommand {
       rows.back().push_back(image.is_in_database ? std::to_string(image.num_excluded_keypoints)
                                                  : "-");
     }
-    return FormatTable(rows) + FindingsText(report) + Counts(report) + "\n";
-  }
-
-  // Each rule that has findings, with the first of them.
-  static std::string FindingsText(const LintReport& report) {
-    constexpr size_t kMaxShown = 20;
-    std::string text;
-    for (const LintRule& rule : LintRules()) {
-      std::string lines;
-      size_t count = 0;
-      for (const LintFinding& finding : report.findings) {
-        if (finding.rule != &rule || count++ >= kMaxShown) continue;
-        const std::string colon = finding.name.empty() || finding.detail.empty() ? "" : ": ";
-        lines += "  " + finding.name + colon + finding.detail + "\n";
-      }
-      if (count == 0) continue;
-      if (count > kMaxShown) {
-        lines += "  and " + std::to_string(count - kMaxShown) + " more (all with --json)\n";
-      }
-      text += std::string(Word(rule.severity)) + " " + std::string(rule.code) + ": " +
-              std::string(rule.meaning) + "; to do: " + std::string(rule.advice) + "\n" + lines;
-    }
-    return text;
+    return FormatTable(rows) + FindingsText(LintRules(), report.findings) + Counts(report) + "\n";
   }
 
   json Json(const LintReport& report) const {
@@ -181,21 +150,14 @@ struct MaskLintCommand {
       images.push_back({{"name", image.name},
                         {"masks", image.mask_names},
                         {"effect", EffectWord(image.effect)},
-                        {"excluded_share", vgtw::Json(image.excluded_share)},
+                        {"excluded_share", NumberOrNull(image.excluded_share)},
                         {"is_in_database", image.is_in_database},
                         {"num_keypoints", image.num_keypoints},
                         {"num_excluded_keypoints", image.num_excluded_keypoints}});
     }
-    json findings = json::array();
-    for (const LintFinding& finding : report.findings) {
-      findings.push_back({{"code", finding.rule->code},
-                          {"severity", Word(finding.rule->severity)},
-                          {"name", finding.name},
-                          {"detail", finding.detail}});
-    }
     return {{"colmap_version", options.colmap_version},
             {"images", images},
-            {"findings", findings},
+            {"findings", FindingsJson(report.findings)},
             {"is_inverted", report.is_inverted},
             {"num_errors", report.Count(LintSeverity::kError)},
             {"num_warnings", report.Count(LintSeverity::kWarning)}};

@@ -42,13 +42,7 @@ struct ProtocolTimesCommand {
 
   void Run() {
     Apply(usability);
-    options.program = FindNetworkProgram();
-    if (options.program.empty()) {
-      throw Error(
-          "vgtw-network is not installed: build with -DVGTW_WITH_NETWORK=ON after apt-get install "
-          "libtorch-dev");
-    }
-    PrepareNetworkEnvironment();
+    options.program = RequireNetworkProgram();
     AtomicFolder folder(output_path, overwrite);
     options.scratch = folder.path() / "scratch";
     fs::create_directory(options.scratch);

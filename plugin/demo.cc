@@ -11,8 +11,6 @@
 #include "plugin/mask_scores.h"
 #include "plugin/network_program.h"
 #include "plugin/progress.h"
-#include "plugin/subprocess.h"
-#include "scene/error.h"
 #include "scene/image_io.h"
 #include "scene/parallel.h"
 
@@ -88,14 +86,7 @@ void PredictByNetwork(const DemoOptions& options) {
     arguments.insert(arguments.end(), {"--lora_path", options.weights[1].string()});
   }
   Announce("predicting poses, depths and masks by the network");
-  const fs::path program = FindNetworkProgram();
-  if (program.empty()) throw Error("vgtw-network is not installed, expected it beside vgtw");
-  PrepareNetworkEnvironment();
-  const SubprocessResult run = RunSubprocess(program, arguments, out / "predict.log");
-  if (run.exit_code != 0) {
-    throw Error("vgtw predict ended with " + std::to_string(run.exit_code) + ": " +
-                Printable(run.output));
-  }
+  RunNetworkProgram(RequireNetworkProgram(), arguments, out / "predict.log");
 }
 
 PixelCounts ComparePixels(const DemoOptions& options) {

@@ -4,9 +4,7 @@
 #include "plugin/subprocess.h"
 #include "scene/error.h"
 
-#include <string>
 #include <system_error>
-#include <vector>
 
 #include <stdlib.h>
 #include <unistd.h>
@@ -49,13 +47,28 @@ void PrepareNetworkEnvironment() {
   }
 }
 
-void BecomeNetworkProgram(int argc, char** argv) {
+fs::path RequireNetworkProgram() {
   const fs::path program = FindNetworkProgram();
-  if (program.empty()) {
-    throw Error(
-        "vgtw-network is not installed: build with -DVGTW_WITH_NETWORK=ON after apt-get install "
-        "libtorch-dev");
-  }
+  if (!program.empty()) return program;
+  throw Error(
+      "vgtw-network is not installed: build with -DVGTW_WITH_NETWORK=ON after apt-get install "
+      "libtorch-dev");
+}
+
+void RunNetworkProgram(const fs::path& program,
+                       const std::vector<std::string>& arguments,
+                       const fs::path& log_path) {
+  PrepareNetworkEnvironment();
+  const SubprocessResult run = RunSubprocess(program, arguments, log_path);
+  if (run.exit_code == 0) return;
+  Fail(program,
+       arguments.front() + " ended with " + std::to_string(run.exit_code) + ": " +
+           Printable(run.output),
+       "exit code 0");
+}
+
+void BecomeNetworkProgram(int argc, char** argv) {
+  const fs::path program = RequireNetworkProgram();
   PrepareNetworkEnvironment();
   std::vector<char*> arguments = {const_cast<char*>(program.c_str())};
   arguments.insert(arguments.end(), argv + 1, argv + argc);

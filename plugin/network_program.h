@@ -4,7 +4,9 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace vgtw {
 
@@ -28,10 +30,18 @@ std::filesystem::path FindNetworkProgram();
 // has set it:
 //   OPENBLAS_CORETYPE  where OpenBLAS may take the processor for an older one
 //   GOMP_SPINCOUNT     threads that wait for each other spin first; for as long as GCC's OpenMP
-//   lets
-//                      them, the network gets several times slower where other programs want the
-//                      cores, too. Not if OMP_WAIT_POLICY says what the user wants
+//                      lets them, the network gets several times slower where other programs want
+//                      the cores, too. Not if OMP_WAIT_POLICY says what the user wants
 void PrepareNetworkEnvironment();
+
+// As above. Throws Error that says how to install it if it is nowhere.
+std::filesystem::path RequireNetworkProgram();
+
+// Runs a command of the network's program and waits; its output goes to `log_path`, if given.
+// Throws Error with the last of that output if it does not end with 0.
+void RunNetworkProgram(const std::filesystem::path& program,
+                       const std::vector<std::string>& arguments,
+                       const std::filesystem::path& log_path = {});
 
 // Becomes the network's program with the same arguments, so that output, progress and exit code are
 // its own. Returns only by throwing Error: if it is not installed or cannot be executed.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/network_times.h"
 
-#include "plugin/subprocess.h"
+#include "plugin/network_program.h"
 #include "scene/error.h"
 #include "scene/files.h"
 #include "scene/image_io.h"
@@ -53,12 +53,7 @@ json Predict(const NetworkTimesOptions& options, const fs::path& photos) {
                                         "--json",
                                         json_path.string()};
   arguments.insert(arguments.end(), options.flags.begin(), options.flags.end());
-  const SubprocessResult run = RunSubprocess(options.program, arguments);
-  if (run.exit_code != 0) {
-    Fail(options.program,
-         "ended with " + std::to_string(run.exit_code) + ": " + Printable(run.output),
-         "predictions");
-  }
+  RunNetworkProgram(options.program, arguments);
   json result = json::parse(ReadFile(json_path), nullptr, /*allow_exceptions=*/false);
   if (!result.is_object()) Fail(json_path, "is no JSON object", "the --json of vgtw predict");
   result.erase("views");
