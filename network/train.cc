@@ -217,8 +217,10 @@ class TrainRun {
     const std::unique_ptr<Model> model =
         BuildModel(ParameterScope(leaves, ProductType()), start_.network);
     leaves.ClearGradients();
-    const SampleLoss loss =
-        ComputeSampleLoss(*model, ToDevice(samples_.Get(idx), device_), options_.loss_weights);
+    const SampleLoss loss = ComputeSampleLoss(*model,
+                                              ToDevice(samples_.Get(idx), device_),
+                                              options_.loss_weights,
+                                              options_.feature_layer);
     if (loss.total.requires_grad()) torch::autograd::backward({loss.total}, {});
     return loss;
   }
@@ -278,7 +280,8 @@ class TrainRun {
     ParallelFor(options_.num_validation_scenes, static_cast<int>(leaves_.size()), [&](int64_t i) {
       UseThreads(threads_per_worker_);
       const auto idx = static_cast<uint64_t>(i);
-      scores[idx] = ScoreSample(*model, ToDevice(held_out_.Get(idx), device_));
+      scores[idx] =
+          ScoreSample(*model, ToDevice(held_out_.Get(idx), device_), options_.feature_layer);
     });
     if (scores.empty()) return;
     summary_.validations.push_back(Summarise(scores, step));

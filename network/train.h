@@ -55,6 +55,8 @@ struct TrainOptions {
 
   // In the order of TrainingLoss; the defaults are the paper's, which has no labels of geometry.
   std::array<double, kNumTrainingLosses> loss_weights = {0.2, 0.01, 0.05};
+  // Which of the four layers that dense heads read suppression and consistency look at, in [0,3].
+  int feature_layer = 3;
 
   // What is learnt from: folders, if there are any, and rendered scenes without end.
   SceneStreamOptions scenes = {};
@@ -96,19 +98,23 @@ struct TrainingStep {
 };
 
 // Of predictions on held-out scenes, each scene in the frame of its first view, scales by medians.
+// training_log.h names the fields.
 struct ValidationScore {
   int64_t step = 0;  // that were done
   double mask_f1 = 0.0;
   double mask_iou = 0.0;
   double mask_precision = 0.0;
   double mask_recall = 0.0;
-  double abs_rel = 0.0;             // depth
-  double within_1_25 = 0.0;         // share of depths
+  double abs_rel = 0.0;             // depths of static pixels
+  double within_1_25 = 0.0;         // share of these
   double rotation_deg = 0.0;        // median over pairs of views
   double direction_deg = 0.0;       // of the translation, likewise
   double pairs_within_5_deg = 0.0;  // share of pairs, both errors
   // Mean confidence on distractors over that on static pixels.
   double confidence_ratio = 0.0;
+  // Mean similarity of any two static patches of a scene, by the features that suppression and
+  // consistency read: 1 = features tell nothing apart.
+  double patch_similarity = 0.0;
 };
 
 struct TrainSummary {

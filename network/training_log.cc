@@ -15,17 +15,18 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::pair<const char*, double ValidationScore::*> kScoreFields[] = {
-    {"mask_f1", &ValidationScore::mask_f1},
-    {"mask_iou", &ValidationScore::mask_iou},
-    {"mask_precision", &ValidationScore::mask_precision},
-    {"mask_recall", &ValidationScore::mask_recall},
-    {"abs_rel", &ValidationScore::abs_rel},
-    {"within_1_25", &ValidationScore::within_1_25},
-    {"rotation_deg", &ValidationScore::rotation_deg},
-    {"direction_deg", &ValidationScore::direction_deg},
-    {"pairs_within_5_deg", &ValidationScore::pairs_within_5_deg},
-    {"confidence_ratio", &ValidationScore::confidence_ratio}};
+constexpr ScoreField kScoreFields[] = {
+    {"mask_f1", "mask F1", 3, &ValidationScore::mask_f1},
+    {"mask_iou", "mask IoU", 3, &ValidationScore::mask_iou},
+    {"mask_precision", "precision", 3, &ValidationScore::mask_precision},
+    {"mask_recall", "recall", 3, &ValidationScore::mask_recall},
+    {"abs_rel", "AbsRel", 4, &ValidationScore::abs_rel},
+    {"within_1_25", "within 1.25", 3, &ValidationScore::within_1_25},
+    {"rotation_deg", "rotation (deg)", 2, &ValidationScore::rotation_deg},
+    {"direction_deg", "direction (deg)", 2, &ValidationScore::direction_deg},
+    {"pairs_within_5_deg", "pairs within 5 deg", 3, &ValidationScore::pairs_within_5_deg},
+    {"confidence_ratio", "confidence ratio", 3, &ValidationScore::confidence_ratio},
+    {"patch_similarity", "similarity", 3, &ValidationScore::patch_similarity}};
 
 double NumberAt(const json& entry, const char* name) {
   const auto found = entry.find(name);
@@ -45,9 +46,9 @@ std::optional<Line> ParseLine(std::string text, int64_t num_steps_done) {
   if (!line.entry.is_object()) return std::nullopt;
   const auto step = line.entry.find("step");
   if (step == line.entry.end() || !step->is_number_integer()) return std::nullopt;
-  line.is_validation = line.entry.contains(kScoreFields[0].first);
-  const int64_t first_without = line.is_validation ? num_steps_done : num_steps_done - 1;
-  if (step->get<int64_t>() > first_without) return std::nullopt;
+  line.is_validation = line.entry.contains(kScoreFields[0].name);
+  const int64_t last_kept = line.is_validation ? num_steps_done : num_steps_done - 1;
+  if (step->get<int64_t>() > last_kept) return std::nullopt;
   line.text = std::move(text);
   return line;
 }
@@ -57,7 +58,9 @@ void Append(const Line& line, TrainingLog& log) {
   if (line.is_validation) {
     ValidationScore& score = log.validations.emplace_back();
     score.step = step;
-    for (const auto& [name, field] : kScoreFields) score.*field = NumberAt(line.entry, name);
+    for (const ScoreField& field : kScoreFields) {
+      score.*field.value = NumberAt(line.entry, field.name);
+    }
     return;
   }
   TrainingStep& entry = log.steps.emplace_back();
@@ -87,6 +90,8 @@ TrainingLog LogOf(const std::vector<Line>& lines) {
 
 }  // namespace
 
+std::span<const ScoreField> ScoreFields() { return kScoreFields; }
+
 std::string LogLine(const TrainingStep& step) {
   json entry = {{"step", step.step}, {"learning_rate", step.learning_rate}, {"loss", step.loss}};
   for (size_t i = 0; i < kNumTrainingLosses; ++i) entry[kTrainingLossNames[i]] = step.losses[i];
@@ -95,7 +100,7 @@ std::string LogLine(const TrainingStep& step) {
 
 std::string LogLine(const ValidationScore& score) {
   json entry = {{"step", score.step}};
-  for (const auto& [name, field] : kScoreFields) entry[name] = score.*field;
+  for (const ScoreField& field : kScoreFields) entry[field.name] = score.*field.value;
   return entry.dump();
 }
 

@@ -8,12 +8,22 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
 namespace vgtw {
 
 inline constexpr char kTrainingLogFile[] = "log.jsonl";  // in the folder of a run
+
+struct ScoreField {
+  const char* name;   // in JSON
+  const char* title;  // for people
+  int num_digits;     // that people want to see behind the point
+  double ValidationScore::*value;
+};
+// All of a ValidationScore but its step.
+std::span<const ScoreField> ScoreFields();
 
 // Lines without their end.
 std::string LogLine(const TrainingStep& step);

@@ -39,14 +39,21 @@ class Sum {
 
 }  // namespace
 
+at::Tensor PatchFeatures(const Features& features, int layer) {
+  const at::Tensor& tokens =
+      layer == 3 ? features.last : features.layers[static_cast<size_t>(layer)];
+  return tokens.slice(1, kNumSpecialTokens);
+}
+
 SampleLoss ComputeSampleLoss(const Model& model,
                              const TrainingSample& sample,
-                             const std::array<double, kNumTrainingLosses>& weights) {
+                             const std::array<double, kNumTrainingLosses>& weights,
+                             int feature_layer) {
   Sum sum(weights, sample.images);
   const int64_t num_views = sample.images.size(0);
   const Features features = model.Encode(sample.images, {});
   if (sum.Wants(TrainingLoss::kSuppression) || sum.Wants(TrainingLoss::kConsistency)) {
-    const FeatureLosses losses = ComputeFeatureLosses(features.last.slice(1, kNumSpecialTokens),
+    const FeatureLosses losses = ComputeFeatureLosses(PatchFeatures(features, feature_layer),
                                                       LabelTokens(sample.distractor));
     sum.Add(TrainingLoss::kSuppression, losses.suppression);
     sum.Add(TrainingLoss::kConsistency, losses.consistency);

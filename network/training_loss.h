@@ -17,10 +17,15 @@ struct SampleLoss {
   std::array<double, kNumTrainingLosses> values = {};  // not weighted; 0 where the weight is
 };
 
+// [S, P, C] of one of the four layers that dense heads read; 3 = the last of all, which every model
+// has.
+at::Tensor PatchFeatures(const Features& features, int layer);
+
 // Of one sample on the model's device. Only what has a weight is computed, and what a sample knows
-// nothing of is 0. Layers that suppression and consistency read: the patches of the last.
+// nothing of is 0. `feature_layer` as in TrainOptions.
 SampleLoss ComputeSampleLoss(const Model& model,
                              const TrainingSample& sample,
-                             const std::array<double, kNumTrainingLosses>& weights);
+                             const std::array<double, kNumTrainingLosses>& weights,
+                             int feature_layer);
 
 }  // namespace vgtw

@@ -60,6 +60,8 @@ void TrainOptions::Check() const {
     VGTW_CHECK(loss_weights[i] >= 0.0 && std::isfinite(loss_weights[i]),
                std::string(kTrainingLossNames[i]) + "_weight = " + std::to_string(loss_weights[i]));
   }
+  VGTW_CHECK(feature_layer >= 0 && feature_layer < 4,
+             "feature_layer = " + std::to_string(feature_layer));
   CheckShare(scene_share, "scene_share");
   VGTW_CHECK(num_scenes >= 0, "num_scenes = " + std::to_string(num_scenes));
   VGTW_CHECK(num_steps > 0, "num_steps = " + std::to_string(num_steps));
@@ -95,6 +97,7 @@ std::string IdentityOf(const TrainOptions& options, uint64_t start) {
                          {"lora", {options.lora.rank, options.lora.alpha}},
                          {"lora_dropout", options.lora_dropout},
                          {"loss_weights", options.loss_weights},
+                         {"feature_layer", options.feature_layer},
                          {"scenes", ScenesAsJson(options.scenes)},
                          {"scene_share", options.scene_share},
                          {"scene_kind", options.scene_kind},

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "network/validation.h"
 
+#include "network/config.h"
+#include "network/distractor_losses.h"
+#include "network/training_loss.h"
 #include "scene/statistics.h"
 
 #include <algorithm>
@@ -25,8 +28,11 @@ void AddMasks(const at::Tensor& logits, const at::Tensor& truth, SampleScore& sc
   score.false_negatives = Count(~said & is);
 }
 
-void AddDepths(const at::Tensor& depth, const at::Tensor& truth, SampleScore& score) {
-  const at::Tensor known = IsKnownDepth(truth);
+void AddDepths(const at::Tensor& depth,
+               const at::Tensor& truth,
+               const at::Tensor& distractor,
+               SampleScore& score) {
+  const at::Tensor known = IsKnownDepth(truth) & (distractor < 0.5);
   score.num_depths = Count(known);
   if (score.num_depths == 0) return;
   const at::Tensor is = truth.masked_select(known);
@@ -44,6 +50,14 @@ void AddConfidences(const at::Tensor& confidence,
   if (on_distractors.numel() == 0 || on_static.numel() == 0) return;
   score.confidence_on_distractors = on_distractors.mean().item<double>();
   score.confidence_on_static = on_static.mean().item<double>();
+}
+
+// The mean of a b over all pairs of unit vectors is the square of their mean.
+void AddSimilarity(const at::Tensor& patches, const at::Tensor& is_static, SampleScore& score) {
+  const at::Tensor chosen = patches.flatten(0, 1).index({is_static.flatten()}).to(at::kDouble);
+  if (chosen.size(0) == 0) return;
+  const at::Tensor lengths = chosen.norm(2, 1, /*keepdim=*/true).clamp_min(1e-12);
+  score.patch_similarity = (chosen / lengths).mean(0).square().sum().item<double>();
 }
 
 // [S, 3, 4] -> rotation and translation of j_from_i for all i < j, stacked: [N, 3, 3] and [N, 3].
@@ -83,7 +97,7 @@ double Ratio(double a, double b) { return b > 0.0 ? a / b : 0.0; }
 
 }  // namespace
 
-SampleScore ScoreSample(const Model& model, const TrainingSample& sample) {
+SampleScore ScoreSample(const Model& model, const TrainingSample& sample, int feature_layer) {
   const at::NoGradGuard no_gradients;
   const Features features = model.Encode(sample.images, {});
   const DenseOutputs outputs =
@@ -93,8 +107,10 @@ SampleScore ScoreSample(const Model& model, const TrainingSample& sample) {
     AddMasks(outputs.distractor_logits, sample.distractor, score);
   }
   AddConfidences(outputs.depth_conf, sample.distractor, score);
+  AddSimilarity(
+      PatchFeatures(features, feature_layer), LabelTokens(sample.distractor).is_static, score);
   if (!sample.truth.depth.defined()) return score;
-  AddDepths(outputs.depth, sample.truth.depth, score);
+  AddDepths(outputs.depth, sample.truth.depth, sample.distractor, score);
   AddPoses(model.PredictCameras(features).cam_from_world, sample.truth.cam_from_world, score);
   return score;
 }
@@ -102,7 +118,7 @@ SampleScore ScoreSample(const Model& model, const TrainingSample& sample) {
 ValidationScore Summarise(const std::vector<SampleScore>& samples, int64_t step) {
   SampleScore sum;
   double num_pairs_within = 0.0;
-  std::vector<double> confidence_ratios;
+  std::vector<double> confidence_ratios, similarities;
   for (const SampleScore& sample : samples) {
     sum.true_positives += sample.true_positives;
     sum.false_positives += sample.false_positives;
@@ -122,6 +138,7 @@ ValidationScore Summarise(const std::vector<SampleScore>& samples, int64_t step)
     if (sample.confidence_on_static > 0.0) {
       confidence_ratios.push_back(sample.confidence_on_distractors / sample.confidence_on_static);
     }
+    if (sample.patch_similarity > 0.0) similarities.push_back(sample.patch_similarity);
   }
   ValidationScore score;
   score.step = step;
@@ -140,6 +157,7 @@ ValidationScore Summarise(const std::vector<SampleScore>& samples, int64_t step)
     score.direction_deg = Median(sum.directions_deg);
   }
   if (!confidence_ratios.empty()) score.confidence_ratio = Median(confidence_ratios);
+  if (!similarities.empty()) score.patch_similarity = Median(similarities);
   return score;
 }
 

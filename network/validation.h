@@ -17,7 +17,7 @@ struct SampleScore {
   int64_t true_positives = 0;
   int64_t false_positives = 0;
   int64_t false_negatives = 0;
-  // Of known depths, scaled by the ratio of the medians over all views together.
+  // Of known depths of static pixels, scaled by the ratio of the medians over all views together.
   double sum_relative_errors = 0.0;
   int64_t num_within_1_25 = 0;
   int64_t num_depths = 0;
@@ -28,10 +28,11 @@ struct SampleScore {
   // Confidence of depths, where both a distractor and something static are seen; else 0.
   double confidence_on_distractors = 0.0;
   double confidence_on_static = 0.0;
+  double patch_similarity = 0.0;  // mean over any two static patches; 0 without
 };
 
-// With a distractor head or without.
-SampleScore ScoreSample(const Model& model, const TrainingSample& sample);
+// With a distractor head or without. `feature_layer` as in TrainOptions.
+SampleScore ScoreSample(const Model& model, const TrainingSample& sample, int feature_layer);
 
 ValidationScore Summarise(const std::vector<SampleScore>& samples, int64_t step);
 

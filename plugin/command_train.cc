@@ -125,29 +125,18 @@ struct TrainCommand {
   fs::path CurvesPath() const { return output_path / "curves.svg"; }
 
   std::string Text(const TrainSummary& summary) const {
-    std::vector<std::vector<std::string>> table = {{"steps",
-                                                    "mask F1",
-                                                    "IoU",
-                                                    "AbsRel",
-                                                    "d < 1.25 (%)",
-                                                    "rotation (deg)",
-                                                    "direction (deg)",
-                                                    "pairs < 5 deg (%)",
-                                                    "conf. ratio"}};
+    std::vector<std::vector<std::string>> table = {{"steps"}};
+    for (const ScoreField& field : ScoreFields()) table[0].push_back(field.title);
     for (const ValidationScore& score : summary.validations) {
-      table.push_back({std::to_string(score.step),
-                       FormatNumber(score.mask_f1, 3),
-                       FormatNumber(score.mask_iou, 3),
-                       FormatNumber(score.abs_rel, 4),
-                       FormatNumber(100.0 * score.within_1_25, 1),
-                       FormatNumber(score.rotation_deg, 2),
-                       FormatNumber(score.direction_deg, 2),
-                       FormatNumber(100.0 * score.pairs_within_5_deg, 1),
-                       FormatNumber(score.confidence_ratio, 3)});
+      table.push_back({std::to_string(score.step)});
+      for (const ScoreField& field : ScoreFields()) {
+        table.back().push_back(FormatNumber(score.*field.value, field.num_digits));
+      }
     }
     return FormatTable(table) +
-           "held-out scenes; depths scaled by medians per scene; rotation and direction of the "
-           "baseline: medians over pairs of views\n" +
+           "held-out scenes; depths of static pixels, scaled by medians per scene; rotation and "
+           "direction of the baseline: medians over pairs of views; confidence on distractors / on "
+           "static pixels; similarity of any two static patches\n" +
            std::to_string(summary.num_steps) + " steps, " + std::to_string(summary.num_trained) +
            " parameters, " + FormatNumber(summary.seconds, 0) + " s, peak memory " +
            FormatNumber(summary.peak_memory_gib, 2) +
@@ -158,17 +147,7 @@ struct TrainCommand {
   json Json(const TrainSummary& summary) const {
     json validations = json::array();
     for (const ValidationScore& score : summary.validations) {
-      validations.push_back({{"step", score.step},
-                             {"mask_f1", score.mask_f1},
-                             {"mask_iou", score.mask_iou},
-                             {"mask_precision", score.mask_precision},
-                             {"mask_recall", score.mask_recall},
-                             {"abs_rel", score.abs_rel},
-                             {"within_1_25_percent", 100.0 * score.within_1_25},
-                             {"rotation_deg", score.rotation_deg},
-                             {"direction_deg", score.direction_deg},
-                             {"pairs_within_5_deg_percent", 100.0 * score.pairs_within_5_deg},
-                             {"confidence_ratio", score.confidence_ratio}});
+      validations.push_back(json::parse(LogLine(score)));
     }
     return {{"num_steps", summary.num_steps},
             {"num_parameters", summary.num_trained},
@@ -237,6 +216,10 @@ struct TrainCommand {
                 &options.loss_weights[i],
                 "Weight of the loss; 0 = none");
     }
+    flags.Add("feature_layer",
+              &options.feature_layer,
+              "Which of the four layers that dense heads read suppression and consistency look at, "
+              "from 0");
   }
 
   void DeclareOptimiser(Flags& flags) {

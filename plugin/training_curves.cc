@@ -78,18 +78,14 @@ std::vector<Panel> PanelsOf(const TrainingLog& log) {
              [i](const TrainingStep& step) { return step.losses[i]; });
   }
   of_steps("learning rate", [](const TrainingStep& step) { return step.learning_rate; });
-  const auto of_validations = [&](const std::string& title, double ValidationScore::*field) {
-    const auto value_of = [field](const ValidationScore& score) { return score.*field; };
-    AddPanel("held out: " + title, log.validations, value_of, /*has_dots=*/true, panels);
-  };
-  of_validations("mask F1", &ValidationScore::mask_f1);
-  of_validations("mask IoU", &ValidationScore::mask_iou);
-  of_validations("depth AbsRel", &ValidationScore::abs_rel);
-  of_validations("depths within 1.25", &ValidationScore::within_1_25);
-  of_validations("rotation (deg)", &ValidationScore::rotation_deg);
-  of_validations("direction of baselines (deg)", &ValidationScore::direction_deg);
-  of_validations("pairs within 5 deg", &ValidationScore::pairs_within_5_deg);
-  of_validations("confidence on distractors / static", &ValidationScore::confidence_ratio);
+  for (const ScoreField& field : ScoreFields()) {
+    const auto value_of = [&](const ValidationScore& score) { return score.*field.value; };
+    AddPanel("held out: " + std::string(field.title),
+             log.validations,
+             value_of,
+             /*has_dots=*/true,
+             panels);
+  }
   return panels;
 }
 

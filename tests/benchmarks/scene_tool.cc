@@ -2,6 +2,9 @@
 // What benchmarks of the whole program need beside it:
 //   scene_tool render FOLDER NUM_VIEWS PATH      photos/, masks/, truth/ (a predictions folder) of
 //                                                the synthetic scene; PATH: orbit, forward, grid
+//   scene_tool scenes FOLDER NUM VIEWS WIDTH HEIGHT SEED
+//                                                photos/<scene>/, masks/<scene>/, truth/<scene>/ of
+//                                                scenes that `vgtw train --scenes demo` renders
 //   scene_tool perturb PREDICTIONS OUTPUT ROTATION_DEG CENTRE_% FOCAL_% DEPTH_% SEED
 //                                                the same predictions with errors
 //   scene_tool error MODEL PREDICTIONS           poses of a COLMAP model against predictions, JSON
@@ -9,11 +12,13 @@
 #include "bridge/mask_files.h"
 #include "bridge/predictions.h"
 #include "evaluation/pose_error.h"
+#include "scene/demo_scenes.h"
 #include "scene/error.h"
 #include "scene/parallel.h"
 #include "scene/perturb.h"
 #include "scene/synthetic.h"
 
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -50,6 +55,46 @@ void Render(const fs::path& folder, int num_views, const std::string& path) {
   WritePrediction(MakeTruePrediction(scene), folder / "truth", /*overwrite=*/false);
 }
 
+// What is static and seen.
+ViewPrediction TrueView(const SceneSample& scene, size_t view_idx) {
+  ViewPrediction truth;
+  View& view = truth.view;
+  view.name = "view_" + std::to_string(100 + view_idx) + ".png";
+  view.camera = scene.cameras[view_idx];
+  view.cam_from_world = scene.cam_from_world[view_idx];
+  truth.depth = scene.depth[view_idx];
+  truth.distractor = scene.distractor[view_idx];
+  view.network_width = truth.depth.width();
+  view.network_height = truth.depth.height();
+  truth.depth_conf = ConfidenceMap(view.network_width, view.network_height, 1.0f);
+  for (size_t k = 0; k < truth.depth.size(); ++k) {
+    if (truth.distractor.data()[k] > 0.5f) truth.depth.data()[k] = std::nanf("");
+  }
+  return truth;
+}
+
+void WriteScenes(char** args) {
+  const fs::path folder = args[0];
+  SceneStreamOptions options;
+  options.min_views = options.max_views = std::atoi(args[2]);
+  options.width = std::atoi(args[3]);
+  options.height = std::atoi(args[4]);
+  options.seed = std::strtoull(args[5], nullptr, 10);
+  ParallelFor(std::atoi(args[1]), 0, [&](int64_t i) {
+    const SceneSample scene = SampleDemoScene(options, static_cast<uint64_t>(i));
+    const std::string name = "scene_" + std::to_string(1000 + i);
+    Prediction truth;
+    truth.producer = "scene_tool";
+    for (size_t k = 0; k < scene.images.size(); ++k) {
+      const ViewPrediction& view = truth.views.emplace_back(TrueView(scene, k));
+      WriteImage(folder / "photos" / name / view.view.name, scene.images[k]);
+      WriteImage(MaskPath(folder / "masks" / name, view.view.name),
+                 MakeStaticMask(view.view, view.distractor, {.dilate_px = 0}));
+    }
+    WritePrediction(truth, folder / "truth" / name, /*overwrite=*/false);
+  });
+}
+
 void PerturbFolder(char** args) {
   PerturbOptions options;
   options.rotation_deg = std::atof(args[2]);
@@ -80,6 +125,8 @@ int Main(int argc, char** argv) {
   try {
     if (verb == "render" && argc == 5) {
       Render(argv[2], std::atoi(argv[3]), argv[4]);
+    } else if (verb == "scenes" && argc == 8) {
+      WriteScenes(argv + 2);
     } else if (verb == "perturb" && argc == 9) {
       PerturbFolder(argv + 2);
     } else if (verb == "error" && argc == 4) {

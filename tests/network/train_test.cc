@@ -111,9 +111,10 @@ TEST(Train, OverfitsMasksOfTwoScenes) {
   const LoadedNetwork network =
       LoadNetwork({options.weights.front(), folder / "lora" / "weights.safetensors"}, {});
   const SceneSamples samples(options.scenes, options.scene_kind);
-  const ValidationScore score = Summarise(
-      {ScoreSample(*network.model, samples.Get(0)), ScoreSample(*network.model, samples.Get(1))},
-      options.num_steps);
+  const ValidationScore score =
+      Summarise({ScoreSample(*network.model, samples.Get(0), options.feature_layer),
+                 ScoreSample(*network.model, samples.Get(1), options.feature_layer)},
+                options.num_steps);
   EXPECT_GT(score.mask_iou, 0.95);
 }
 

@@ -3,9 +3,13 @@
 
 #include "network/vggt.h"
 #include "tests/network/tiny_training.h"
+#include "tests/parity/parity_fixture.h"
+#include "tests/support/shared_data.h"
 
 #include <cmath>
+#include <map>
 #include <string>
+#include <vector>
 
 #include <ATen/ATen.h>
 #include <gtest/gtest.h>
@@ -52,23 +56,43 @@ TEST(TrainedParameters, OfTheExtensionAreLoraAndDistractorHead) {
   EXPECT_EQ(num_lora, 2 * 4 * 4 * 2 * 16);  // kinds of blocks, depth, matrices, rank, channels
 }
 
-// Names and shapes are those of the paper's checkpoint: 6,291,456 numbers of LoRA and 32,671,041 of
-// the head.
-TEST(TrainedParameters, OfThePublishedSizesAreThoseOfTheCheckpoint) {
+std::vector<ListingSource::Row> PublishedSizes() {
   VggtConfig config;
   config.lora = LoraConfig{};
   config.has_distractor_head = true;
   ListingSource listing;
   const Vggt model(ParameterScope(listing), config);
+  return listing.rows();
+}
+
+// 6,291,456 numbers of LoRA and 32,671,041 of the head, as in the paper's checkpoint.
+TEST(TrainedParameters, OfThePublishedSizesAreAsManyAsInTheCheckpoint) {
   int64_t num_lora = 0;
   int64_t num_head = 0;
-  for (const ListingSource::Row& row : listing.rows()) {
+  for (const ListingSource::Row& row : PublishedSizes()) {
     const int64_t num = c10::multiply_integers(row.shape);
     if (GroupOf(row.name) == ParameterGroup::kLora) num_lora += num;
     if (GroupOf(row.name) == ParameterGroup::kDistractorHead) num_head += num;
   }
   EXPECT_EQ(num_lora, 6291456);
   EXPECT_EQ(num_head, 32671041);
+}
+
+// So that a file of LoRA and head loads over VGGT-1B, here and in the official code.
+TEST(TrainedParameters, OfThePublishedSizesAreWhatVgtwHasAndVggtHasNot) {
+  VGTW_NEED_PARITY_DATA();
+  auto expected = ReadParityShapes(ParityData() / "state_dict.VGTW-LoRA.txt");
+  for (const auto& [name, shape] : ReadParityShapes(ParityData() / "state_dict.VGGT-1B.txt")) {
+    EXPECT_EQ(expected.erase(name), 1u) << name;
+  }
+  std::map<std::string, Shape> trained;
+  for (const ListingSource::Row& row : PublishedSizes()) {
+    const ParameterGroup group = GroupOf(row.name);
+    if (group == ParameterGroup::kLora || group == ParameterGroup::kDistractorHead) {
+      trained[row.name] = row.shape;
+    }
+  }
+  EXPECT_EQ(trained, expected);
 }
 
 TEST(TrainedParameters, OfANewNetworkAreAll) {

@@ -36,7 +36,7 @@ class SampleLossTest : public testing::Test {
   }
 
   SampleLoss Loss(const Weights& weights) const {
-    return ComputeSampleLoss(*model_, sample_, weights);
+    return ComputeSampleLoss(*model_, sample_, weights, /*feature_layer=*/3);
   }
 
   NetworkDescription network_ = TrainableNetwork();

@@ -19,6 +19,7 @@ class FakeModel : public Model {
     Features features;
     features.height = images.size(2);
     features.width = images.size(3);
+    features.last = tokens;
     return features;
   }
   CameraOutputs PredictCameras(const Features&) const override { return cameras; }
@@ -29,6 +30,7 @@ class FakeModel : public Model {
     throw std::logic_error("not asked for");
   }
 
+  at::Tensor tokens;
   CameraOutputs cameras;
   DenseOutputs maps;
 };
@@ -46,21 +48,25 @@ at::Tensor Poses(int64_t num_views, double degrees) {
   return at::stack(poses).to(at::kDouble);
 }
 
+// Three views of 1 x 5 patches; the first two patches of each are a distractor.
 class ValidationTest : public testing::Test {
  protected:
   ValidationTest() {
-    sample_.images = at::zeros({3, 3, 4, 5});
-    sample_.distractor = at::zeros({3, 4, 5});
-    sample_.distractor.slice(2, 0, 2).fill_(1.0);
-    sample_.truth.depth = 1.0 + at::arange(60, at::kFloat).view({3, 4, 5});
+    sample_.images = at::zeros({3, 3, 14, 70});
+    sample_.distractor = at::zeros({3, 14, 70});
+    sample_.distractor.slice(2, 0, 28).fill_(1.0);
+    sample_.truth.depth = 1.0 + at::arange(3 * 14 * 70, at::kFloat).view({3, 14, 70});
     sample_.truth.cam_from_world = Poses(3, 10.0);
     model_.cameras.cam_from_world = Poses(3, 10.0);
     model_.maps.depth = 3.0 * sample_.truth.depth;  // another scale is no error
     model_.maps.depth_conf = 1.0 + 2.0 * (sample_.distractor < 0.5).to(at::kFloat);
     model_.maps.distractor_logits = 8.0 * sample_.distractor - 4.0;
+    model_.tokens = at::ones({3, 10, 2});
   }
 
-  ValidationScore Score() const { return Summarise({ScoreSample(model_, sample_)}, 7); }
+  ValidationScore Score() const {
+    return Summarise({ScoreSample(model_, sample_, /*feature_layer=*/3)}, 7);
+  }
 
   TrainingSample sample_;
   FakeModel model_;
@@ -77,13 +83,14 @@ TEST_F(ValidationTest, TruthIsWithoutError) {
   EXPECT_NEAR(score.direction_deg, 0.0, 1e-5);
   EXPECT_EQ(score.pairs_within_5_deg, 1.0);
   EXPECT_NEAR(score.confidence_ratio, 1.0 / 3.0, 1e-6);
+  EXPECT_NEAR(score.patch_similarity, 1.0, 1e-6);
 }
 
 TEST_F(ValidationTest, MasksAreCounted) {
-  // Of 24 true pixels (two of five columns), the first column is found, and another is wrong.
-  model_.maps.distractor_logits = at::full({3, 4, 5}, -1.0);
-  model_.maps.distractor_logits.select(2, 0).fill_(1.0);
-  model_.maps.distractor_logits.select(2, 4).fill_(1.0);
+  // Of two patches the first is found, and another is wrong.
+  model_.maps.distractor_logits = at::full({3, 14, 70}, -1.0);
+  model_.maps.distractor_logits.slice(2, 0, 14).fill_(1.0);
+  model_.maps.distractor_logits.slice(2, 56, 70).fill_(1.0);
   const ValidationScore score = Score();
   EXPECT_NEAR(score.mask_precision, 0.5, 1e-12);
   EXPECT_NEAR(score.mask_recall, 0.5, 1e-12);
@@ -111,12 +118,28 @@ TEST_F(ValidationTest, SignOfADirectionCounts) {
 }
 
 TEST_F(ValidationTest, RelativeErrorsAreThoseAfterTheMedian) {
-  at::Tensor depth = sample_.truth.depth.clone();
-  depth.flatten().slice(0, 0, 15).mul_(1.5);  // 15 of 60, all nearer than the median
-  model_.maps.depth = depth;
+  // Ten of 42 rows, all nearer than the median.
+  model_.maps.depth = sample_.truth.depth.clone();
+  model_.maps.depth[0].slice(0, 0, 10).mul_(1.5);
   const ValidationScore score = Score();
-  EXPECT_NEAR(score.abs_rel, 15.0 * 0.5 / 60.0, 1e-6);
-  EXPECT_NEAR(score.within_1_25, 0.75, 1e-12);
+  EXPECT_NEAR(score.abs_rel, 10.0 * 0.5 / 42.0, 1e-6);
+  EXPECT_NEAR(score.within_1_25, 32.0 / 42.0, 1e-6);
+}
+
+TEST_F(ValidationTest, DepthsOfDistractorsDoNotCount) {
+  model_.maps.depth = sample_.truth.depth.clone();
+  model_.maps.depth.slice(2, 0, 28).mul_(5.0);
+  EXPECT_EQ(Score().abs_rel, 0.0);
+}
+
+TEST_F(ValidationTest, SimilarityIsThatOfAnyTwoStaticPatches) {
+  // Static patches lie along x in the first two views and along y in the third, so that of 9 pairs
+  // of views 5 are alike, whatever lengths and distractors are.
+  model_.tokens = at::zeros({3, 10, 2});
+  model_.tokens.slice(0, 0, 2).select(2, 0).fill_(1.0);
+  model_.tokens.slice(0, 2, 3).select(2, 1).fill_(7.0);
+  model_.tokens.slice(1, 5, 7).fill_(-3.0);
+  EXPECT_NEAR(Score().patch_similarity, 5.0 / 9.0, 1e-6);
 }
 
 }  // namespace
