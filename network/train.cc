@@ -172,7 +172,7 @@ class TrainRun {
     for (int i = 0; i < num_workers; ++i) leaves_.emplace_back(parameters_);
   }
 
-  TrainSummary Run(const ProgressCallback& progress) {
+  TrainSummary Run(const ProgressCallback& progress, const std::function<bool()>& should_stop) {
     const Clock::time_point start = Clock::now();
     const fs::path state_path = output_path_ / kStateFile;
     const std::string identity = IdentityOf(options_, start_.fingerprint);
@@ -185,16 +185,19 @@ class TrainRun {
       WriteTrainingState(state_path, parameters_, optimiser_.moments(), step, identity);
       last_save = Clock::now();
     };
-    for (; step < options_.num_steps;) {
+    while (step < options_.num_steps && !summary_.is_stopped) {
       Log(LogLine(Step(step)));
       ++step;
       if (progress) progress(step, options_.num_steps);
       if (step % options_.validate_every == 0 || step == options_.num_steps) Validate(step);
       if (SecondsSince(last_save) > options_.save_every_sec) save();
+      summary_.is_stopped = step < options_.num_steps && should_stop && should_stop();
     }
     save();
-    WriteTrainedWeights(
-        output_path_ / kWeightsFile, start_.network, parameters_, optimiser_.moments());
+    if (!summary_.is_stopped) {
+      WriteTrainedWeights(
+          output_path_ / kWeightsFile, start_.network, parameters_, optimiser_.moments());
+    }
     summary_.num_steps = step;
     summary_.num_trained = parameters_.NumTrained();
     summary_.seconds = SecondsSince(start);
@@ -311,13 +314,14 @@ class TrainRun {
 
 TrainSummary Train(const TrainOptions& options,
                    const fs::path& output_path,
-                   const ProgressCallback& progress) {
+                   const ProgressCallback& progress,
+                   const std::function<bool()>& should_stop) {
   options.Check();
   UseThreads(options.num_threads);
   std::error_code error;
   fs::create_directories(output_path, error);
   if (error) Fail(output_path, "cannot be made (" + error.message() + ")", "a folder for the run");
-  return WithPlainErrors([&] { return TrainRun(options, output_path).Run(progress); },
+  return WithPlainErrors([&] { return TrainRun(options, output_path).Run(progress, should_stop); },
                          "; use fewer --max_views, a smaller --width or --recompute 1");
 }
 

@@ -118,7 +118,8 @@ struct ValidationScore {
 };
 
 struct TrainSummary {
-  int64_t num_steps = 0;
+  int64_t num_steps = 0;    // that are done
+  bool is_stopped = false;  // before the last
   int64_t num_trained = 0;  // parameters
   std::vector<ValidationScore> validations;
   double seconds = 0.0;  // of this run
@@ -133,9 +134,12 @@ struct TrainSummary {
 // Law: a run that was killed and resumed ends with the same bits as one that was not, with the same
 // options, machine and number of threads. Throws Error if the weights, photos or masks are not
 // usable, if the folder holds a run with other options, or if the loss is not finite.
+// `should_stop` is asked after every step; where it says true, the state is written, no weights
+// are, and the rest is for the next call.
 TrainSummary Train(const TrainOptions& options,
                    const std::filesystem::path& output_path,
-                   const ProgressCallback& progress = {});
+                   const ProgressCallback& progress = {},
+                   const std::function<bool()>& should_stop = {});
 
 // Removes what a run left in `output_path`, and nothing else that lies there.
 void ForgetRun(const std::filesystem::path& output_path);

@@ -10,14 +10,32 @@
 #include "scene/error.h"
 #include "scene/files.h"
 
+#include <csignal>
 #include <filesystem>
 #include <memory>
+
+#include <signal.h>
 
 namespace vgtw {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
+
+// Ctrl-C and a polite kill end a run after its present step; asked a second time it ends at once.
+class StopSignals {
+ public:
+  StopSignals() {
+    struct sigaction action = {};
+    action.sa_handler = [](int) { is_wanted_ = 1; };
+    action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
+    for (const int signal : {SIGINT, SIGTERM}) ::sigaction(signal, &action, nullptr);
+  }
+  static bool AreWanted() { return is_wanted_ != 0; }
+
+ private:
+  static inline volatile std::sig_atomic_t is_wanted_ = 0;
+};
 
 // A flag per field of TrainOptions; what is not a number is resolved by Options().
 struct TrainCommand {
@@ -115,7 +133,13 @@ struct TrainCommand {
     TrainSummary summary;
     {
       ProgressDisplay display("steps");
-      summary = Train(resolved, output_path, display.Callback());
+      const StopSignals signals;
+      summary = Train(resolved, output_path, display.Callback(), &StopSignals::AreWanted);
+    }
+    if (summary.is_stopped) {
+      throw Error("stopped after " + std::to_string(summary.num_steps) + " of " +
+                  std::to_string(num_steps) + " steps, which are saved in " + output_path.string() +
+                  "; the same command goes on from there");
     }
     const std::string curves = DrawTrainingCurves(ReadTrainingLog(output_path / kTrainingLogFile));
     if (!curves.empty()) WriteFileAtomically(CurvesPath(), curves);

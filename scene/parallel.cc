@@ -23,7 +23,8 @@ void ParallelFor(int64_t n,
   std::atomic<int64_t> next = 0;
   std::mutex mutex;
   int64_t num_done = 0;
-  std::exception_ptr first_exception;
+  std::exception_ptr exception;
+  int64_t exception_idx = n;
   const auto run = [&] {
     for (int64_t i = next++; i < n; i = next++) {
       try {
@@ -34,7 +35,10 @@ void ParallelFor(int64_t n,
       } catch (...) {
         next = n;
         const std::lock_guard lock(mutex);
-        if (!first_exception) first_exception = std::current_exception();
+        // Indices are begun in order: all below the lowest that fails have been.
+        if (i >= exception_idx) continue;
+        exception_idx = i;
+        exception = std::current_exception();
       }
     }
   };
@@ -49,7 +53,7 @@ void ParallelFor(int64_t n,
   }
   run();
   for (std::thread& thread : threads) thread.join();
-  if (first_exception) std::rethrow_exception(first_exception);
+  if (exception) std::rethrow_exception(exception);
 }
 
 }  // namespace vgtw

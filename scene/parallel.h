@@ -11,8 +11,9 @@ namespace vgtw {
 // Threads to use for a request; 0 or less = all cores.
 int ResolveThreads(int num_threads);
 
-// Calls work(i) for i in [0, n) on `num_threads` threads (see ResolveThreads). The first exception
-// stops further work and is rethrown in the caller. `progress` is called under a lock.
+// Calls work(i) for i in [0, n) on `num_threads` threads (see ResolveThreads). An exception stops
+// further work; rethrown in the caller is that of the lowest i, so that the same faults give the
+// same message on any number of threads. `progress` is called under a lock.
 void ParallelFor(int64_t n,
                  int num_threads,
                  const std::function<void(int64_t)>& work,

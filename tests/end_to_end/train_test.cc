@@ -20,8 +20,8 @@ using testing::HasSubstr;
 
 class TrainCommand : public testing::Test {
  protected:
-  // A network of four small layers, one step in some 50 ms; saves its state after every step.
-  void WriteConfig(int num_steps) const {
+  // A network of four small layers, one step in some 50 ms.
+  void WriteConfig(int num_steps, const std::string& save_every_sec = "0.001") const {
     WriteFileAtomically(config_,
                         "trains = \"all\"\n"
                         "dim = 16\ndepth = 4\nheads = 2\nencoder_depth = 0\n"
@@ -32,13 +32,32 @@ class TrainCommand : public testing::Test {
                         "mask_weight = 1\nsuppression_weight = 0.1\nconsistency_weight = 0.1\n"
                         "camera_weight = 1\ndepth_weight = 1\ncorrespondence_weight = 0.1\n"
                         "ema_decay = 0.9\nvalidate_every = 10\nvalidation_scenes = 2\n"
-                        "save_every_sec = 0.001\n"
-                        "steps = " +
-                            std::to_string(num_steps) + "\n");
+                        "save_every_sec = " +
+                            save_every_sec + "\nsteps = " + std::to_string(num_steps) + "\n");
   }
 
   std::vector<std::string> Arguments(const fs::path& run) const {
     return {"train", "--config", config_.string(), "--output_path", run.string(), "--threads", "2"};
+  }
+
+  // Starts a run in the folder of this name and signals all its processes after some ten steps.
+  void StartAndSignal(const std::string& name, const std::string& signal) const {
+    std::string command;
+    for (const std::string& argument : Arguments(folder_ / name)) command += " '" + argument + "'";
+    const std::string log = (folder_ / name / "log.jsonl").string();
+    const std::string said = (folder_ / (name + ".txt")).string();
+    WriteFileAtomically(folder_ / "signal.sh",
+                        "setsid " VGTW_PROGRAM + command + " >'" + said +
+                            "' 2>&1 & pid=$!\n"
+                            "for i in $(seq 1200); do\n"
+                            "  [ \"$(cat '" +
+                            log +
+                            "' 2>/dev/null | wc -l)\" -ge 12 ] && break\n"
+                            "  sleep 0.05\n"
+                            "done\n"
+                            "kill " +
+                            signal + " -- -$pid && wait $pid; true\n");
+    ASSERT_EQ(std::system(("bash '" + (folder_ / "signal.sh").string() + "'").c_str()), 0);
   }
 
   const TemporaryFolder folder_;
@@ -48,21 +67,7 @@ class TrainCommand : public testing::Test {
 TEST_F(TrainCommand, KilledRunGoesOnAsIfNothingHadHappened) {
   WriteConfig(40);
   ASSERT_EQ(RunVgtw(Arguments(folder_ / "whole")).exit_code, 0);
-  // Killed with all its processes, in the middle of a step.
-  std::string command;
-  for (const std::string& argument : Arguments(folder_ / "killed"))
-    command += " '" + argument + "'";
-  const std::string log = (folder_ / "killed" / "log.jsonl").string();
-  const std::string script = "setsid " VGTW_PROGRAM + command + " >/dev/null 2>&1 & pid=$!\n" +
-                             "for i in $(seq 1200); do\n"
-                             "  [ \"$(cat '" +
-                             log +
-                             "' 2>/dev/null | wc -l)\" -ge 12 ] && break\n"
-                             "  sleep 0.05\n"
-                             "done\n"
-                             "kill -9 -- -$pid && wait $pid; true\n";
-  WriteFileAtomically(folder_ / "kill.sh", script);
-  ASSERT_EQ(std::system(("bash '" + (folder_ / "kill.sh").string() + "'").c_str()), 0);
+  StartAndSignal("killed", "-9");
   ASSERT_TRUE(fs::exists(folder_ / "killed" / "state.safetensors"));
   ASSERT_FALSE(fs::exists(folder_ / "killed" / "weights.safetensors")) << "it was not killed";
   const ColmapRun resumed = RunVgtw(Arguments(folder_ / "killed"));
@@ -70,6 +75,18 @@ TEST_F(TrainCommand, KilledRunGoesOnAsIfNothingHadHappened) {
   for (const char* name : {"log.jsonl", "weights.safetensors", "curves.svg"}) {
     EXPECT_TRUE(ReadFile(folder_ / "whole" / name) == ReadFile(folder_ / "killed" / name)) << name;
   }
+}
+
+TEST_F(TrainCommand, StoppedRunKeepsEveryStep) {
+  WriteConfig(80, /*save_every_sec=*/"1e9");
+  StartAndSignal("stopped", "-TERM");
+  const std::string said = ReadFile(folder_ / "stopped.txt");
+  EXPECT_THAT(said, HasSubstr("of 80 steps, which are saved in"));
+  const std::string log = ReadFile(folder_ / "stopped" / "log.jsonl");
+  ASSERT_FALSE(fs::exists(folder_ / "stopped" / "weights.safetensors"));
+  const ColmapRun resumed = RunVgtw(Arguments(folder_ / "stopped"));
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.output;
+  EXPECT_TRUE(ReadFile(folder_ / "stopped" / "log.jsonl").starts_with(log));
 }
 
 TEST_F(TrainCommand, TellsOfAllItsValidationsAndDrawsThem) {

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -48,6 +49,21 @@ TEST(ParallelFor, RethrowsAndStops) {
       EXPECT_STREQ(error.what(), "unit 3");
     }
     EXPECT_LT(num_calls, 1'000'000);
+  }
+}
+
+TEST(ParallelFor, RethrowsWhatTheLowestThrewWhoeverWasFirst) {
+  std::atomic<bool> has_second_thrown = false;
+  const auto work = [&](int64_t i) {
+    if (i == 1) has_second_thrown = true;
+    while (!has_second_thrown) std::this_thread::yield();
+    throw std::runtime_error("unit " + std::to_string(i));
+  };
+  try {
+    ParallelFor(2, 2, work);
+    FAIL() << "nothing was thrown";
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "unit 0");
   }
 }
 
