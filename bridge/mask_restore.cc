@@ -54,25 +54,6 @@ void RequireUnchanged(SqliteConnection& connection, const std::filesystem::path&
        "--force gives them up");
 }
 
-// Whether the kept content has the size that its row's columns ask for.
-void CheckKept(SqliteConnection& connection, const MaskedTable& table, const Entry& entry) {
-  SqliteQuery query(connection,
-                    MaskedTableSql("SELECT u.rows, length(u.data), t.cols "
-                                   "FROM vgtw_mask_undo AS u JOIN {table} AS t "
-                                   "ON t.{row_id} = u.row_id WHERE undo_id = ?",
-                                   table),
-                    entry.undo_id);
-  if (!query.Next()) return;
-  const double num_bytes = static_cast<double>(query.Int(0)) * static_cast<double>(query.Int(2)) *
-                           static_cast<double>(table.bytes_per_value);
-  if (num_bytes == static_cast<double>(query.Int(1))) return;
-  Fail(connection.path(),
-       std::string("keeps ") + std::to_string(query.Int(1)) + " bytes for " + table.row_label +
-           " " + std::to_string(entry.row_id),
-       std::to_string(query.Int(0)) + " rows",
-       "restore it from a copy");
-}
-
 // Returns whether the row still existed.
 bool RestoreRow(SqliteConnection& connection, const MaskedTable& table, const Entry& entry) {
   if (entry.is_newer) {
@@ -80,17 +61,17 @@ bool RestoreRow(SqliteConnection& connection, const MaskedTable& table, const En
                        entry.row_id);
     return connection.NumChangedRows() > 0;
   }
-  CheckKept(connection, table, entry);
-  connection.Execute(
-      MaskedTableSql(table.has_config
-                         ? "UPDATE {table} SET (rows, data, config) = (SELECT rows, data, config "
-                           "FROM vgtw_mask_undo WHERE undo_id = ?1) WHERE {row_id} = ?2"
-                         : "UPDATE {table} SET (rows, data) = (SELECT rows, data "
-                           "FROM vgtw_mask_undo WHERE undo_id = ?1) WHERE {row_id} = ?2",
-                     table),
-      entry.undo_id,
-      entry.row_id);
-  return connection.NumChangedRows() > 0;
+  SqliteQuery query(connection,
+                    MaskedTableSql("SELECT u.rows, u.config, u.data, t.cols "
+                                   "FROM vgtw_mask_undo AS u JOIN {table} AS t "
+                                   "ON t.{row_id} = u.row_id WHERE undo_id = ?",
+                                   table),
+                    entry.undo_id);
+  if (!query.Next()) return false;
+  std::vector<uint32_t> buffer;
+  const MaskedRow original = ReadOriginal(query, table, entry.row_id, buffer);
+  connection.Execute(table.update_sql, original.rows, original.data, original.config, entry.row_id);
+  return true;
 }
 
 void CountRestored(const MaskedTable& table, RestoreMasksSummary& summary) {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bridge/mask_undo.h"
 
+#include "scene/error.h"
+
+#include <limits>
 #include <map>
 #include <string>
-#include <vector>
 
 namespace vgtw {
 namespace {
@@ -96,6 +98,20 @@ std::vector<int64_t> FindNewerPairs(SqliteConnection& connection,
   return pair_ids;
 }
 
+// The indices in half of their bytes; empty if one does not fit.
+std::vector<uint16_t> PackIndices(BlobBytes indices) {
+  std::vector<uint16_t> packed(indices.size() / sizeof(uint32_t));
+  uint32_t all_bits = 0;
+  for (size_t i = 0; i < packed.size(); ++i) {
+    uint32_t index = 0;
+    std::memcpy(&index, indices.data() + i * sizeof(index), sizeof(index));
+    all_bits |= index;
+    packed[i] = static_cast<uint16_t>(index);
+  }
+  if (all_bits > std::numeric_limits<uint16_t>::max()) packed.clear();
+  return packed;
+}
+
 void CreateTable(SqliteConnection& connection) {
   connection.Execute(
       "CREATE TABLE vgtw_mask_undo (undo_id INTEGER PRIMARY KEY NOT NULL, "
@@ -140,6 +156,33 @@ void MarkForeignRows(SqliteConnection& connection) {
   }
 }
 
+MaskedRow ReadOriginal(const SqliteQuery& query,
+                       const MaskedTable& table,
+                       int64_t row_id,
+                       std::vector<uint32_t>& buffer) {
+  const int64_t rows = query.Int(0);
+  const BlobBytes data = query.Blob(2);
+  MaskedRow original = {static_cast<size_t>(rows), data, query.Int(1)};
+  const double num_values = static_cast<double>(rows) * static_cast<double>(query.Int(3));
+  const auto num_bytes = static_cast<double>(data.size());
+  if (num_bytes == num_values * static_cast<double>(table.bytes_per_value)) return original;
+  if (!table.holds_indices || num_bytes != num_values * sizeof(uint16_t)) {
+    Fail(query.path(),
+         std::string("keeps ") + std::to_string(data.size()) + " bytes for " + table.row_label +
+             " " + std::to_string(row_id),
+         std::to_string(rows) + " rows",
+         "restore it from a copy");
+  }
+  buffer.resize(data.size() / sizeof(uint16_t));
+  for (size_t i = 0; i < buffer.size(); ++i) {
+    uint16_t index = 0;
+    std::memcpy(&index, data.data() + i * sizeof(index), sizeof(index));
+    buffer[i] = index;
+  }
+  original.data = AsBlob(buffer);
+  return original;
+}
+
 MaskUndo::MaskUndo(SqliteConnection& connection, bool keep)
     : connection_(connection), keep_(keep), has_table_(HasMaskUndo(connection)) {
   if (!has_table_) return;
@@ -156,6 +199,8 @@ void MaskUndo::Keep(const MaskedTable& table,
                     int64_t applied_hash) {
   if (!has_table_) CreateTable(connection_);
   has_table_ = true;
+  const std::vector<uint16_t> packed =
+      table.holds_indices ? PackIndices(original.data) : std::vector<uint16_t>();
   connection_.Execute(
       "INSERT INTO vgtw_mask_undo (table_name, row_id, rows, config, applied_hash, data) "
       "VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT (table_name, row_id) DO UPDATE "
@@ -165,7 +210,7 @@ void MaskUndo::Keep(const MaskedTable& table,
       original.rows,
       original.config,
       applied_hash,
-      original.data);
+      packed.empty() ? original.data : AsBlob(packed));
 }
 
 void MaskUndo::Rewrite(const MaskedTable& table,
@@ -174,8 +219,8 @@ void MaskUndo::Rewrite(const MaskedTable& table,
                        size_t rows,
                        BlobBytes data) {
   const int64_t config = rows == 0 ? 0 : original.config;
-  if (keep_) Keep(table, row_id, original, Fingerprint(data) + config);
   connection_.Execute(table.update_sql, rows, data, config, row_id);
+  if (keep_) Keep(table, row_id, original, Fingerprint(data) + config);
 }
 
 }  // namespace vgtw

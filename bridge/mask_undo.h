@@ -4,9 +4,11 @@
 //   vgtw_mask_undo (undo_id, table_name, row_id, rows, config, applied_hash, data)
 // one row per changed row of keypoints, descriptors (row_id = image_id), matches and
 // two_view_geometries (row_id = pair_id; config is theirs alone). rows, config and data are the
-// original, from before the first ApplyMasks; applied_hash is that of the content that the last one
-// left. NULL there marks a row that somebody else wrote to since; NULL in data one that did not
-// exist then, but would be wrong afterwards, since it names renumbered keypoints.
+// original, from before the first ApplyMasks; data of matches whose indices all fit takes 16 bits
+// for each in place of 32, which its size tells: about what the masks freed, so that the file
+// hardly grows. applied_hash is that of the content that the last ApplyMasks left. NULL there marks
+// a row that somebody else wrote to since; NULL in data one that did not exist then, but would be
+// wrong afterwards, since it names renumbered keypoints.
 #pragma once
 
 #include "bridge/colmap_rows.h"
@@ -15,6 +17,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace vgtw {
 
@@ -26,6 +29,7 @@ struct MaskedTable {
   const char* update_sql;  // rows, data, configuration, row id
   size_t bytes_per_value;
   bool has_config;
+  bool holds_indices;  // of keypoints: uint32
 };
 inline constexpr MaskedTable kKeypointsTable = {
     "keypoints",
@@ -33,6 +37,7 @@ inline constexpr MaskedTable kKeypointsTable = {
     "keypoints",
     "UPDATE keypoints SET rows = ?1, data = ?2 WHERE image_id = ?4",
     4,
+    false,
     false};
 inline constexpr MaskedTable kDescriptorsTable = {
     "descriptors",
@@ -40,6 +45,7 @@ inline constexpr MaskedTable kDescriptorsTable = {
     "descriptors",
     "UPDATE descriptors SET rows = ?1, data = ?2 WHERE image_id = ?4",
     1,
+    false,
     false};
 inline constexpr MaskedTable kMatchesTable = {
     "matches",
@@ -47,13 +53,15 @@ inline constexpr MaskedTable kMatchesTable = {
     "matches",
     "UPDATE matches SET rows = ?1, data = ?2 WHERE pair_id = ?4",
     4,
-    false};
+    false,
+    true};
 inline constexpr MaskedTable kTwoViewTable = {
     "two_view_geometries",
     "pair_id",
     "two-view geometry",
     "UPDATE two_view_geometries SET rows = ?1, data = ?2, config = ?3 WHERE pair_id = ?4",
     4,
+    true,
     true};
 inline constexpr std::array kMaskedTables = {
     kKeypointsTable, kDescriptorsTable, kMatchesTable, kTwoViewTable};
@@ -96,6 +104,14 @@ class MaskUndo {
 };
 
 bool HasMaskUndo(SqliteConnection& connection);
+
+// The original that the current row of `query` tells of: rows, config and data of the undo table,
+// then cols of the row `row_id`. Its data is in `buffer` where it was packed, else the query's.
+// Throws Error if the size of the data is that of no such row.
+MaskedRow ReadOriginal(const SqliteQuery& query,
+                       const MaskedTable& table,
+                       int64_t row_id,
+                       std::vector<uint32_t>& buffer);
 
 // Marks, in the table, rows that others wrote to since masks were applied.
 void MarkForeignRows(SqliteConnection& connection);

@@ -63,6 +63,36 @@ TEST_P(MaskRestoreTest, UndoesSeveralAppliesAtOnce) {
   EXPECT_EQ(DumpRows(path_), original_);
 }
 
+// Indices above 65,535 take 32 bits, those of other pairs 16; both come back.
+TEST_P(MaskRestoreTest, LargeIndicesAreKeptWhole) {
+  constexpr uint32_t kNumKeypoints = 65'537;
+  {
+    ColmapDatabase database(path_, ColmapDatabase::Mode::kReadWrite);
+    ColmapDatabase::Transaction transaction(database);
+    Keypoints keypoints{kNumKeypoints, 2, std::vector<float>(2 * kNumKeypoints, 10.5f)};
+    keypoints.data[0] = 60.5f;
+    database.WriteKeypoints(1, keypoints);
+    database.WriteDescriptors(1, {0, 0, 0, {}});
+    database.WriteMatches(1, 2, {{0, 0}, {65'535, 1}, {65'535, 4}});
+    database.WriteMatches(1, 3, {{0, 0}, {65'536, 1}});
+    transaction.Commit();
+  }
+  original_ = DumpRows(path_);
+  ApplyTo(path_);
+  {
+    SqliteConnection connection(path_, SqliteConnection::Mode::kReadOnly);
+    SqliteQuery query(connection,
+                      "SELECT rows, length(data) FROM vgtw_mask_undo "
+                      "WHERE table_name = 'matches' ORDER BY row_id LIMIT 2");
+    ASSERT_TRUE(query.Next());
+    EXPECT_EQ(query.Int(1), 2 * sizeof(uint16_t) * query.Int(0));
+    ASSERT_TRUE(query.Next());
+    EXPECT_EQ(query.Int(1), 2 * sizeof(uint32_t) * query.Int(0));
+  }
+  RestoreMasks(path_, "", {.in_place = true});
+  EXPECT_EQ(DumpRows(path_), original_);
+}
+
 TEST_P(MaskRestoreTest, OfADatabaseInWalModeIsExact) {
   RunSql(path_, "PRAGMA journal_mode = WAL;");
   ApplyTo(path_);
@@ -156,7 +186,7 @@ TEST_P(MaskRestoreTest, SpoiltOriginalsAreNamed) {
   };
   EXPECT_THAT(error_after("UPDATE vgtw_mask_undo SET rows = 1000000007 WHERE row_id = 2147483649 "
                           "AND table_name = 'matches'"),
-              HasSubstr("keeps 40 bytes for matches 2147483649, expected 1000000007 rows"));
+              HasSubstr("keeps 20 bytes for matches 2147483649, expected 1000000007 rows"));
   EXPECT_THAT(error_after("UPDATE vgtw_mask_undo SET table_name = 'sqlite_master' WHERE row_id = "
                           "2147483649 AND table_name = 'matches'"),
               HasSubstr("keeps a row of the table 'sqlite_master'"));
