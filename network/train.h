@@ -115,6 +115,9 @@ struct ValidationScore {
   // Mean similarity of any two static patches of a scene, by the features that suppression and
   // consistency read: 1 = features tell nothing apart.
   double patch_similarity = 0.0;
+  // Share of static patches whose nearest one in another view, by the same features, shows their
+  // place, as consistency takes for granted.
+  double nearest_right = 0.0;
 };
 
 struct TrainSummary {

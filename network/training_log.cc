@@ -26,7 +26,8 @@ constexpr ScoreField kScoreFields[] = {
     {"direction_deg", "direction (deg)", 2, &ValidationScore::direction_deg},
     {"pairs_within_5_deg", "pairs within 5 deg", 3, &ValidationScore::pairs_within_5_deg},
     {"confidence_ratio", "confidence ratio", 3, &ValidationScore::confidence_ratio},
-    {"patch_similarity", "similarity", 3, &ValidationScore::patch_similarity}};
+    {"patch_similarity", "similarity", 3, &ValidationScore::patch_similarity},
+    {"nearest_right", "nearest right", 3, &ValidationScore::nearest_right}};
 
 double NumberAt(const json& entry, const char* name) {
   const auto found = entry.find(name);

@@ -2,6 +2,7 @@
 #include "network/validation.h"
 
 #include "network/config.h"
+#include "network/correspondence_loss.h"
 #include "network/distractor_losses.h"
 #include "network/training_loss.h"
 #include "scene/statistics.h"
@@ -60,6 +61,22 @@ void AddSimilarity(const at::Tensor& patches, const at::Tensor& is_static, Sampl
   score.patch_similarity = (chosen / lengths).mean(0).square().sum().item<double>();
 }
 
+void AddNearestPatches(const at::Tensor& patches,
+                       const TrainingSample& sample,
+                       SampleScore& score) {
+  const PatchMatches matches = MatchPatches(sample.truth, sample.distractor);
+  const at::Tensor directions = patches / patches.norm(2, 2, /*keepdim=*/true).clamp_min(1e-12);
+  for (int64_t i = 0; i < patches.size(0); ++i) {
+    // [S, P]: of each patch of view i, the most similar one of every view.
+    const at::Tensor nearest =
+        at::matmul(directions[i].unsqueeze(0), directions.transpose(1, 2)).argmax(2);
+    const at::Tensor is_around = matches.weight[i] > 0.0;
+    const at::Tensor is_right = (matches.patch[i] == nearest.unsqueeze(2)) & is_around;
+    score.num_matched_patches += Count(is_around.any(2));
+    score.num_nearest_right += Count(is_right.any(2));
+  }
+}
+
 // [S, 3, 4] -> rotation and translation of j_from_i for all i < j, stacked: [N, 3, 3] and [N, 3].
 struct RelativePoses {
   at::Tensor rotations;
@@ -107,10 +124,11 @@ SampleScore ScoreSample(const Model& model, const TrainingSample& sample, int fe
     AddMasks(outputs.distractor_logits, sample.distractor, score);
   }
   AddConfidences(outputs.depth_conf, sample.distractor, score);
-  AddSimilarity(
-      PatchFeatures(features, feature_layer), LabelTokens(sample.distractor).is_static, score);
+  const at::Tensor patches = PatchFeatures(features, feature_layer);
+  AddSimilarity(patches, LabelTokens(sample.distractor).is_static, score);
   if (!sample.truth.depth.defined()) return score;
   AddDepths(outputs.depth, sample.truth.depth, sample.distractor, score);
+  AddNearestPatches(patches, sample, score);
   AddPoses(model.PredictCameras(features).cam_from_world, sample.truth.cam_from_world, score);
   return score;
 }
@@ -138,6 +156,8 @@ ValidationScore Summarise(const std::vector<SampleScore>& samples, int64_t step)
     if (sample.confidence_on_static > 0.0) {
       confidence_ratios.push_back(sample.confidence_on_distractors / sample.confidence_on_static);
     }
+    sum.num_matched_patches += sample.num_matched_patches;
+    sum.num_nearest_right += sample.num_nearest_right;
     if (sample.patch_similarity > 0.0) similarities.push_back(sample.patch_similarity);
   }
   ValidationScore score;
@@ -158,6 +178,8 @@ ValidationScore Summarise(const std::vector<SampleScore>& samples, int64_t step)
   }
   if (!confidence_ratios.empty()) score.confidence_ratio = Median(confidence_ratios);
   if (!similarities.empty()) score.patch_similarity = Median(similarities);
+  score.nearest_right = Ratio(static_cast<double>(sum.num_nearest_right),
+                              static_cast<double>(sum.num_matched_patches));
   return score;
 }
 

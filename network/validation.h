@@ -29,6 +29,10 @@ struct SampleScore {
   double confidence_on_distractors = 0.0;
   double confidence_on_static = 0.0;
   double patch_similarity = 0.0;  // mean over any two static patches; 0 without
+  // Patches whose place another view shows, once for each such view, and those of them whose most
+  // similar patch there is one of the four around that place.
+  int64_t num_matched_patches = 0;
+  int64_t num_nearest_right = 0;
 };
 
 // With a distractor head or without. `feature_layer` as in TrainOptions.

@@ -57,6 +57,7 @@ class ValidationTest : public testing::Test {
     sample_.distractor.slice(2, 0, 28).fill_(1.0);
     sample_.truth.depth = 1.0 + at::arange(3 * 14 * 70, at::kFloat).view({3, 14, 70});
     sample_.truth.cam_from_world = Poses(3, 10.0);
+    sample_.truth.intrinsics = at::eye(3, at::kDouble).repeat({3, 1, 1});
     model_.cameras.cam_from_world = Poses(3, 10.0);
     model_.maps.depth = 3.0 * sample_.truth.depth;  // another scale is no error
     model_.maps.depth_conf = 1.0 + 2.0 * (sample_.distractor < 0.5).to(at::kFloat);
@@ -140,6 +141,20 @@ TEST_F(ValidationTest, SimilarityIsThatOfAnyTwoStaticPatches) {
   model_.tokens.slice(0, 2, 3).select(2, 1).fill_(7.0);
   model_.tokens.slice(1, 5, 7).fill_(-3.0);
   EXPECT_NEAR(Score().patch_similarity, 5.0 / 9.0, 1e-6);
+}
+
+TEST_F(ValidationTest, NearestPatchesAreRightWhereTheyShowThePlace) {
+  // The same view of a wall three times: static patch p shows what p of the others shows. Features
+  // turn by 20 degrees from patch to patch; the last one of the third view has those of the first.
+  sample_.truth.depth = at::full({3, 14, 70}, 2.0f);
+  sample_.truth.cam_from_world = at::eye(3, 4, at::kDouble).repeat({3, 1, 1});
+  const at::Tensor angles = at::arange(5, at::kFloat) * (20.0 * 3.14159265358979 / 180.0);
+  model_.tokens.slice(1, 5).copy_(at::stack({angles.cos(), angles.sin()}, 1));
+  EXPECT_EQ(Score().nearest_right, 1.0);
+  model_.tokens[2][9].copy_(model_.tokens[2][5]);
+  // 3 static patches, 6 ordered pairs of views; wrong are the last one's, of the third view and to
+  // it.
+  EXPECT_NEAR(Score().nearest_right, 14.0 / 18.0, 1e-12);
 }
 
 }  // namespace
