@@ -8,16 +8,24 @@
 //   scene_tool perturb PREDICTIONS OUTPUT ROTATION_DEG CENTRE_% FOCAL_% DEPTH_% SEED
 //                                                the same predictions with errors
 //   scene_tool error MODEL PREDICTIONS           poses of a COLMAP model against predictions, JSON
+//   scene_tool matches DATABASE PREDICTIONS      inlier matches of a database, the share within 3
+//   px of
+//                                                where poses of predictions allow them, pairs with
+//                                                a geometry and photos that these connect, JSON
+#include "bridge/colmap_database.h"
 #include "bridge/colmap_model.h"
 #include "bridge/mask_files.h"
 #include "bridge/predictions.h"
 #include "evaluation/pose_error.h"
+#include "matching/relative_pose.h"
 #include "scene/demo_scenes.h"
+#include "scene/disjoint_sets.h"
 #include "scene/error.h"
 #include "scene/parallel.h"
 #include "scene/perturb.h"
 #include "scene/synthetic.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -120,6 +128,56 @@ void PrintError(const fs::path& model, const fs::path& predictions) {
               comparison->relative_rotation_median_deg);
 }
 
+constexpr double kMaxErrorPx = 3.0;
+
+// Of the matches of a pair, those whose Sampson distance by the poses is small.
+size_t CountRight(const View& view1,
+                  const View& view2,
+                  const Keypoints& keypoints1,
+                  const Keypoints& keypoints2,
+                  const FeatureMatches& matches) {
+  const Eigen::Matrix3d E = EssentialMatrix(view2.cam_from_world * Inverse(view1.cam_from_world));
+  const double focal = 0.5 * (view1.camera.MeanFocalLength() + view2.camera.MeanFocalLength());
+  return static_cast<size_t>(std::count_if(matches.begin(), matches.end(), [&](const auto& match) {
+    const auto ray1 = Unproject(view1.camera, {keypoints1.x(match[0]), keypoints1.y(match[0])});
+    const auto ray2 = Unproject(view2.camera, {keypoints2.x(match[1]), keypoints2.y(match[1])});
+    return ray1 && ray2 && focal * SampsonDistance(E, *ray1, *ray2) <= kMaxErrorPx;
+  }));
+}
+
+void PrintMatches(const fs::path& database_path, const fs::path& predictions) {
+  const PredictionReader reader(predictions);
+  std::map<std::string, const View*> view_by_name;
+  for (const View& view : reader.views()) view_by_name[view.name] = &view;
+  const ColmapDatabase database(database_path, ColmapDatabase::Mode::kReadOnly);
+  std::map<ImageId, const View*> views;
+  std::map<ImageId, Keypoints> keypoints;
+  for (const DatabaseImage& image : database.ReadImages()) {
+    views[image.image_id] = view_by_name.at(image.name);
+    keypoints[image.image_id] = database.ReadKeypoints(image.image_id).value();
+  }
+  size_t num_matches = 0, num_right = 0, num_pairs = 0;
+  DisjointSets<ImageId> connected(views.rbegin()->first + 1);
+  for (const auto& [id1, id2] : database.ReadTwoViewPairs()) {
+    const FeatureMatches matches = database.ReadTwoViewGeometry(id1, id2)->inlier_matches;
+    if (matches.empty()) continue;
+    ++num_pairs;
+    num_matches += matches.size();
+    num_right += CountRight(*views[id1], *views[id2], keypoints[id1], keypoints[id2], matches);
+    connected.Join(id1, id2);
+  }
+  std::map<ImageId, size_t> sizes;
+  for (const auto& [image_id, view] : views) ++sizes[connected.Find(image_id)];
+  size_t num_connected = 0;
+  for (const auto& [root, size] : sizes) num_connected = std::max(num_connected, size);
+  std::printf(
+      "{\"num_matches\": %zu, \"right\": %.4f, \"num_pairs\": %zu, \"num_connected\": %zu}\n",
+      num_matches,
+      static_cast<double>(num_right) / static_cast<double>(std::max<size_t>(num_matches, 1)),
+      num_pairs,
+      num_connected);
+}
+
 int Main(int argc, char** argv) {
   const std::string verb = argc > 1 ? argv[1] : "";
   try {
@@ -131,6 +189,8 @@ int Main(int argc, char** argv) {
       PerturbFolder(argv + 2);
     } else if (verb == "error" && argc == 4) {
       PrintError(argv[2], argv[3]);
+    } else if (verb == "matches" && argc == 4) {
+      PrintMatches(argv[2], argv[3]);
     } else {
       std::fprintf(stderr, "see the head of tests/benchmarks/scene_tool.cc\n");
       return 2;
