@@ -7,9 +7,9 @@
 #include <cstring>
 #include <limits>
 
-// Debian builds for the oldest x86-64, where these loops take four times as long, as they do at -O2:
-// GCC 12 vectorises loops of unknown length at -O3 alone. The function that chooses at load time runs
-// before a sanitizer is ready.
+// Debian builds for the oldest x86-64, where these loops take four times as long, as they do at
+// -O2: GCC 12 vectorises loops of unknown length at -O3 alone. The function that chooses at load
+// time runs before a sanitizer is ready.
 #if defined(__x86_64__) && defined(__linux__) && !defined(__SANITIZE_ADDRESS__)
 #define VGTW_FOR_EACH_CPU __attribute__((target_clones("avx2", "default")))
 #else
