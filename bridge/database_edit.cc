@@ -48,7 +48,7 @@ SqliteConnection& DatabaseEdit::target() {
   if (!copy_) {
     file_.emplace(output_path_, overwrite_);
     source_.CopyTo(file_->path());
-    copy_.emplace(file_->path(), SqliteConnection::Mode::kPrivate);
+    copy_.emplace(file_->path(), SqliteConnection::Mode::kPrivate, source_.path());
     copy_transaction_.emplace(*copy_);
   }
   return *copy_;

@@ -76,10 +76,12 @@ ApplyMasksSummary ApplyMasks(const fs::path& database_path,
     summary.num_linked_keypoints = ExcludeTracks(edit.source(), images, progress);
   }
 
-  MaskUndo undo(edit.target(), options.keep_undo);
+  // Read where it is written: the pages are at hand then.
+  SqliteConnection& target = edit.target();
+  MaskUndo undo(target, options.keep_undo);
   const bool removes_keypoints = options.rule == MaskRule::kKeypoints;
-  if (removes_keypoints) RemoveKeypoints(edit.source(), images, undo, progress);
-  FilterPairs(edit.source(),
+  if (removes_keypoints) RemoveKeypoints(target, images, undo, progress);
+  FilterPairs(target,
               {.renumber = removes_keypoints,
                .min_num_inliers = static_cast<uint64_t>(options.min_num_inliers)},
               undo,

@@ -256,20 +256,20 @@ uint64_t ExcludeTracks(SqliteConnection& connection,
   return num_linked;
 }
 
-void RemoveKeypoints(SqliteConnection& source,
+void RemoveKeypoints(SqliteConnection& connection,
                      const std::vector<MaskedImage>& images,
                      MaskUndo& undo,
                      ProgressCounter& progress) {
   for (const MaskedImage& image : images) {
     if (image.summary.num_excluded_keypoints > 0) {
-      RemoveRows(source, kKeypointsTable, image, undo);
-      RemoveRows(source, kDescriptorsTable, image, undo);
+      RemoveRows(connection, kKeypointsTable, image, undo);
+      RemoveRows(connection, kDescriptorsTable, image, undo);
     }
     progress.Advance(1);
   }
 }
 
-void FilterPairs(SqliteConnection& source,
+void FilterPairs(SqliteConnection& connection,
                  const FilterPairsOptions& options,
                  MaskUndo& undo,
                  ProgressCounter& progress,
@@ -277,7 +277,7 @@ void FilterPairs(SqliteConnection& source,
                  ApplyMasksSummary& summary) {
   const auto filter = [&](const MaskedTable& table, uint64_t min_num_rows, const auto& visit) {
     const PairFilter pair_filter(images, options.renumber, min_num_rows);
-    return FilterTable(source, table, images, pair_filter, undo, visit);
+    return FilterTable(connection, table, images, pair_filter, undo, visit);
   };
   const Counts matches =
       filter(kMatchesTable, 0, [&](const Pair&, const FeatureMatches&) { progress.Advance(1); });

@@ -18,9 +18,9 @@ uint64_t ExcludeTracks(SqliteConnection& connection,
                        std::vector<MaskedImage>& images,
                        ProgressCounter& progress);
 
-// Removes excluded keypoints and their descriptors: reads from `source`, writes by `undo`, whose
-// database has the same content or is the same. Advances by one per image.
-void RemoveKeypoints(SqliteConnection& source,
+// Removes excluded keypoints and their descriptors by `undo`, on the same connection. Advances by
+// one per image.
+void RemoveKeypoints(SqliteConnection& connection,
                      const std::vector<MaskedImage>& images,
                      MaskUndo& undo,
                      ProgressCounter& progress);
@@ -32,7 +32,7 @@ struct FilterPairsOptions {
 
 // Removes the rows of matches and two-view geometries with an excluded endpoint, in the same way.
 // Advances by one per row of the tables. Tells of each image whether it had and has a geometry.
-void FilterPairs(SqliteConnection& source,
+void FilterPairs(SqliteConnection& connection,
                  const FilterPairsOptions& options,
                  MaskUndo& undo,
                  ProgressCounter& progress,

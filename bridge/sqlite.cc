@@ -116,7 +116,8 @@ bool Sync(const fs::path& path) {
 
 }  // namespace
 
-SqliteConnection::SqliteConnection(const fs::path& path, Mode mode) : path_(path), mode_(mode) {
+SqliteConnection::SqliteConnection(const fs::path& path, Mode mode, fs::path origin)
+    : path_(path), mode_(mode), origin_(std::move(origin)) {
   try {
     Open();
   } catch (...) {
@@ -161,7 +162,10 @@ SqliteConnection::~SqliteConnection() {
   sqlite3_close(handle_);
 }
 
-void SqliteConnection::Throw(int code) const { ThrowSqlite(path_, handle_, code); }
+void SqliteConnection::Throw(int code) const {
+  const bool is_damaged = (code & 0xff) == SQLITE_CORRUPT;
+  ThrowSqlite(is_damaged ? path() : path_, handle_, code);
+}
 
 bool SqliteConnection::InTransaction() const { return sqlite3_get_autocommit(handle_) == 0; }
 

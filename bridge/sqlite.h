@@ -37,12 +37,15 @@ class SqliteConnection {
     // A new or unfinished file that no other process knows: neither journal nor syncs.
     kPrivate
   };
-  SqliteConnection(const std::filesystem::path& path, Mode mode);
+  // `origin`, if any, is the file that this one was copied from: faults of the content are told as
+  // faults of it.
+  SqliteConnection(const std::filesystem::path& path, Mode mode, std::filesystem::path origin = {});
   ~SqliteConnection();
   SqliteConnection(const SqliteConnection&) = delete;
   SqliteConnection& operator=(const SqliteConnection&) = delete;
 
-  const std::filesystem::path& path() const { return path_; }
+  // In messages about what was read.
+  const std::filesystem::path& path() const { return origin_.empty() ? path_ : origin_; }
   bool is_read_only() const { return mode_ == Mode::kReadOnly; }
   bool InTransaction() const;
   void Rollback() noexcept;  // no effect outside of a transaction
@@ -69,6 +72,7 @@ class SqliteConnection {
 
   std::filesystem::path path_;
   Mode mode_;
+  std::filesystem::path origin_;
   sqlite3* handle_ = nullptr;
   std::unordered_map<std::string, sqlite3_stmt*> idle_statements_;
 };

@@ -17,6 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
+using testing::Not;
 
 struct Damage {
   const char* name;
@@ -116,6 +117,7 @@ TEST_P(DamagedInput, GivesOneLineAndChangesNothing) {
   const std::string copy_error =
       ErrorOf([&] { ApplyMasks(folder / "a.db", folder / "masks", folder / "b.db", {}); });
   EXPECT_THAT(copy_error, HasSubstr(GetParam().error));
+  EXPECT_THAT(copy_error, Not(HasSubstr(".tmp-")));  // names what the user has
   EXPECT_TRUE(Snapshot(folder.path()) == before);
   const std::string in_place_error =
       ErrorOf([&] { ApplyMasks(folder / "a.db", folder / "masks", "", {.in_place = true}); });

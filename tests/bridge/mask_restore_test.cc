@@ -161,6 +161,14 @@ TEST_P(MaskRestoreTest, PairsMatchedSinceStayIfTheyRemainValid) {
   EXPECT_EQ(DumpRows(path_), original_);
 }
 
+TEST_P(MaskRestoreTest, FaultsFoundInTheCopyNameTheDatabase) {
+  ApplyTo(path_);
+  RunSql(path_, "UPDATE vgtw_mask_undo SET table_name = 'cameras' WHERE undo_id = 1");
+  EXPECT_THAT(ErrorOf([&] { RestoreMasks(path_, folder_ / "b.db", {}); }),
+              HasSubstr("/a.db: keeps a row of the table 'cameras'"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "b.db"));
+}
+
 TEST_P(MaskRestoreTest, NothingKeptIsAnError) {
   EXPECT_THAT(ErrorOfRestore(), HasSubstr("a.db: keeps no originals"));
   ApplyMasks(path_, mask_folder_, folder_ / "b.db", {.rule = GetParam(), .keep_undo = false});
