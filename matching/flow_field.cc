@@ -14,6 +14,7 @@ namespace {
 constexpr size_t kNumNeighbours = 5;
 constexpr size_t kMaxAnchors = 400;
 constexpr size_t kMinAnchors = 2 * kNumNeighbours;
+constexpr float kFar = std::numeric_limits<float>::infinity();
 
 float MedianOf(std::array<float, kNumNeighbours>& values, size_t count) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
@@ -31,6 +32,9 @@ FlowField::FlowField(std::vector<Anchor> anchors) : anchors_(std::move(anchors))
     }
     anchors_ = std::move(sample);
   }
+  std::stable_sort(anchors_.begin(), anchors_.end(), [](const Anchor& a, const Anchor& b) {
+    return a.pixel.x() < b.pixel.x();
+  });
   if (!IsUsable()) return;
   std::vector<double> deviations;
   for (size_t i = 0; i < anchors_.size(); ++i) {
@@ -46,17 +50,27 @@ Eigen::Vector2f FlowField::At(const Eigen::Vector2f& pixel) const {
 }
 
 Eigen::Vector2f FlowField::Without(size_t left_out, const Eigen::Vector2f& pixel) const {
-  // Kept sorted by insertion: nearly every anchor fails the first comparison.
-  std::array<std::pair<float, size_t>, kNumNeighbours> nearest;
-  nearest.fill({std::numeric_limits<float>::infinity(), kNoAnchor});
-  for (size_t i = 0; i < anchors_.size(); ++i) {
-    const float distance = (anchors_[i].pixel - pixel).squaredNorm();
-    if (!(distance < nearest.back().first) || i == left_out) continue;
+  std::array<std::pair<float, size_t>, kNumNeighbours> nearest;  // kept sorted by insertion
+  nearest.fill({kFar, kNoAnchor});
+  // Whether anchors farther on may be near enough: their column is at least as far as that of `i`.
+  const auto visit = [&](size_t i) {
+    const Eigen::Vector2f offset = anchors_[i].pixel - pixel;
+    if (!(offset.x() * offset.x() < nearest.back().first)) return false;
+    const float distance = offset.squaredNorm();
+    if (!(distance < nearest.back().first) || i == left_out) return true;
     nearest.back() = {distance, i};
     for (size_t k = kNumNeighbours - 1; k > 0 && nearest[k].first < nearest[k - 1].first; --k) {
       std::swap(nearest[k], nearest[k - 1]);
     }
-  }
+    return true;
+  };
+  const auto at_right = std::lower_bound(
+      anchors_.begin(), anchors_.end(), pixel.x(), [](const Anchor& anchor, float x) {
+        return anchor.pixel.x() < x;
+      });
+  const auto middle = static_cast<size_t>(at_right - anchors_.begin());
+  for (size_t i = middle; i < anchors_.size() && visit(i); ++i) continue;
+  for (size_t i = middle; i > 0 && visit(i - 1); --i) continue;
   std::array<float, kNumNeighbours> x = {}, y = {};
   size_t count = 0;
   for (const auto& [distance, idx] : nearest) {

@@ -33,7 +33,7 @@ class FlowField {
   static constexpr size_t kNoAnchor = static_cast<size_t>(-1);
   Eigen::Vector2f Without(size_t left_out, const Eigen::Vector2f& pixel) const;
 
-  std::vector<Anchor> anchors_;
+  std::vector<Anchor> anchors_;  // from left to right
   float radius_ = std::numeric_limits<float>::infinity();
 };
 

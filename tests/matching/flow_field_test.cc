@@ -3,6 +3,8 @@
 
 #include "scene/random.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -31,6 +33,31 @@ TEST(FlowField, IsTheMedianOfTheFiveNearest) {
   // At the ends and beyond: of 0 to 4, of 15 to 19.
   EXPECT_EQ(field.At({-1e6f, 0.0f}), Eigen::Vector2f(2.0f, -4.0f));
   EXPECT_EQ(field.At({1e6f, 5.0f}), Eigen::Vector2f(17.0f, -34.0f));
+}
+
+// Against all distances, at pixels inside and outside of the field.
+TEST(FlowField, FindsTheFiveNearestOfACloud) {
+  RandomStream random(7);
+  Anchors anchors;
+  for (int i = 0; i < 301; ++i) {
+    const auto number = static_cast<float>(i);
+    anchors.push_back({{static_cast<float>(random.Uniform(0.0, 640.0)),
+                        static_cast<float>(random.Uniform(0.0, 480.0))},
+                       {number, -number}});
+  }
+  const FlowField field(anchors);
+  for (int i = 0; i < 500; ++i) {
+    const Eigen::Vector2f pixel(static_cast<float>(random.Uniform(-200.0, 900.0)),
+                                static_cast<float>(random.Uniform(-200.0, 700.0)));
+    Anchors sorted = anchors;
+    std::sort(sorted.begin(), sorted.end(), [&](const auto& a, const auto& b) {
+      return (a.pixel - pixel).squaredNorm() < (b.pixel - pixel).squaredNorm();
+    });
+    std::array<float, 5> flows = {};
+    for (size_t k = 0; k < 5; ++k) flows[k] = sorted[k].flow.x();
+    std::sort(flows.begin(), flows.end());
+    EXPECT_EQ(field.At(pixel), Eigen::Vector2f(flows[2], -flows[2])) << pixel.transpose();
+  }
 }
 
 TEST(FlowField, MedianIsPerComponent) {
