@@ -15,7 +15,8 @@ void RefineFlags::Declare(Flags& flags) {
            "A photo with fewer observations of points that three photos see keeps its pose")
       .Add("max_turn_deg",
            &options_.max_turn_deg,
-           "So does one that would turn farther, and 4 times as far as the others, degrees")
+           "So does one that would turn farther, and 4 times as far as the others, degrees, unless "
+           "tracks held out confirm it")
       .Add("max_error_px",
            &options_.max_error_px,
            "Observations that reproject farther off are dropped in the end, pixels")

@@ -126,9 +126,12 @@ std::map<ImageId, double> HeldOutJudge::MedianPxByImage(const Errors& errors) co
   return median_px;
 }
 
-std::map<ImageId, size_t> HeldOutJudge::NumObservations() const {
+std::map<ImageId, size_t> HeldOutJudge::NumObservations(size_t min_track_length) const {
   std::map<ImageId, size_t> num;
-  for (const ImageId id : image_ids_) ++num[id];
+  for (const Track& track : tracks_) {
+    if (track.size() < min_track_length) continue;
+    for (const TrackElement& element : track) ++num[element.image_id];
+  }
   return num;
 }
 

@@ -38,7 +38,8 @@ class HeldOutJudge {
   double MeanPx(const Errors& errors) const;
   std::map<ImageId, double> MeanPxByImage(const Errors& errors) const;
   std::map<ImageId, double> MedianPxByImage(const Errors& errors) const;
-  std::map<ImageId, size_t> NumObservations() const;
+  // Of the tracks that have so many elements.
+  std::map<ImageId, size_t> NumObservations(size_t min_track_length = 0) const;
 
   // Images whose observations got worse by more than `num_sigmas` standard errors of the mean
   // difference.

@@ -26,7 +26,7 @@ struct RefineModelOptions {
   int min_num_observations = 30;
   // Nor are views that would turn by more than this, more than their observations say that they
   // are off and more than 4 times what the views turn in the median, for a seed's errors are of one
-  // size; (0, 180].
+  // size: unless 20 observations held out, of tracks of three views, confirm it; (0, 180].
   double max_turn_deg = 5.0;
   double max_error_px = 4.0;   // of observations in the end; > 0
   double min_angle_deg = 1.5;  // of points; in [0, 90)

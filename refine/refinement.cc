@@ -24,6 +24,10 @@ constexpr double kWorseSigmas = 2.0;
 constexpr double kMaxGrowth = 1.25;
 // Views turn alike if they turn by less than so many medians.
 constexpr double kMaxMedianTurns = 4.0;
+// However far a view turns, it is believed if so many observations held out, of tracks of three
+// views, are explained as well as those of the others, by their mean errors.
+constexpr size_t kMinConfirming = 20;
+constexpr double kMaxConfirmedRatio = 2.0;
 constexpr int kIterationsPerRound = 100;  // at most, two adjustments of 50; repeats are not counted
 // So often is a round repeated without views that it left worse.
 constexpr int kMaxRepeats = 3;
@@ -119,14 +123,26 @@ double Refinement::MaxTurnDeg(ImageId image_id) const {
   return std::max(options_.max_turn_deg, off_rad * 180.0 / std::numbers::pi);
 }
 
+std::set<ImageId> Refinement::FindConfirmedViews(const Judged& candidate) const {
+  std::set<ImageId> confirmed;
+  const auto error_px = judge_.MeanPxByImage(candidate.errors);
+  const double max_error_px =
+      std::min(kMaxConfirmedRatio * Median(Values(error_px)), options_.max_error_px);
+  for (const auto& [id, num] : judge_.NumObservations(/*min_track_length=*/3)) {
+    if (num >= kMinConfirming && error_px.at(id) <= max_error_px) confirmed.insert(id);
+  }
+  return confirmed;
+}
+
 std::map<ImageId, std::string> Refinement::FindTurnedViews(const Judged& candidate,
                                                            const RoundOutcome& outcome) const {
   std::map<ImageId, std::string> turned;
   const std::map<ImageId, double> turns_deg = TurnsDeg(candidate.model);
   const double usual_deg = kMaxMedianTurns * Median(Values(turns_deg));
+  const std::set<ImageId> confirmed = FindConfirmedViews(candidate);
   for (const ImageId id : outcome.adjusted) {
     const double limit_deg = std::max(MaxTurnDeg(id), usual_deg);
-    if (turns_deg.at(id) <= limit_deg) continue;
+    if (turns_deg.at(id) <= limit_deg || confirmed.contains(id)) continue;
     turned[id] = "refinement would turn it by " + Tenths(turns_deg.at(id)) + " deg, at most " +
                  Tenths(limit_deg) + " are believed";
   }

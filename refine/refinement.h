@@ -63,6 +63,8 @@ class Refinement {
   bool HasFoundNothing() const;
   // Views of an adjusted model that are worse than before.
   std::set<ImageId> FindWorseViews(const Judged& candidate, const RoundOutcome& outcome) const;
+  // Those whose poses tracks held out confirm.
+  std::set<ImageId> FindConfirmedViews(const Judged& candidate) const;
   // Those that turned too far to be believed, and why.
   std::map<ImageId, std::string> FindTurnedViews(const Judged& candidate,
                                                  const RoundOutcome& outcome) const;

@@ -106,6 +106,7 @@ TEST(HeldOutJudge, MeansByHand) {
   EXPECT_NEAR(by_image.at(2), 2.0, 1e-12);
   EXPECT_NEAR(by_image.at(3), 6.0, 1e-12);
   EXPECT_EQ(judge.NumObservations(), (std::map<ImageId, size_t>{{1, 2}, {2, 1}, {3, 1}}));
+  EXPECT_EQ(judge.NumObservations(/*min_track_length=*/3), (std::map<ImageId, size_t>{}));
   // Equal errors are their own mean.
   EXPECT_NEAR(judge.MeanPx({7.0, 7.0, 7.0, 7.0}), 7.0, 1e-12);
 }

@@ -262,6 +262,33 @@ TEST(RefineModel, AViewOfWrongObservationsHarmsNobody) {
   }
 }
 
+// Turned about the scene, so that its observations hardly tell by how much.
+TEST(RefineModel, AFarTurnIsBelievedIfTracksHeldOutConfirmIt) {
+  constexpr ImageId kTurned = 4;
+  SyntheticModelOptions options = Scene();
+  options.num_points = 400;
+  Reconstruction truth = MakeSyntheticModel(options);
+  ProjectAgain(truth, 0.5, 1);
+  Reconstruction seed = truth;
+  Perturb(0.5, 1, seed);
+  Rigid3d& pose = seed.images.at(kTurned).cam_from_world;
+  pose = pose * Rigid3d{RotationAboutAxis(Eigen::Vector3d::UnitY(), 20.0), Eigen::Vector3d::Zero()};
+  std::vector<Track> tracks = TracksOf(truth);
+  const RefineModelResult confirmed = RefineModel({}, seed, tracks);
+  EXPECT_EQ(confirmed.views.at(kTurned).outcome, ViewOutcome::kRefined);
+  EXPECT_GT(confirmed.views.at(kTurned).turn_deg, 15.0);
+  EXPECT_LT(Compare(confirmed.refined, truth).rotation_median_deg,
+            1.1 * Floor(truth).rotation_median_deg);
+  // A tenth of 100 tracks is held out.
+  for (size_t i = 100; i < tracks.size(); ++i) {
+    std::erase_if(tracks[i],
+                  [](const TrackElement& element) { return element.image_id == kTurned; });
+  }
+  const RefineModelResult unconfirmed = RefineModel({}, seed, tracks);
+  EXPECT_EQ(unconfirmed.views.at(kTurned).outcome, ViewOutcome::kRejected);
+  EXPECT_TRUE(AreBitEqual(unconfirmed.refined.images.at(kTurned).cam_from_world, pose));
+}
+
 TEST(RefineModel, LeavesOutWhatIsNotANumber) {
   const Reconstruction truth = MakeSyntheticModel(Scene());
   const std::vector<Track> tracks = TracksOf(truth);
