@@ -71,13 +71,14 @@ AdamW::GroupNorms AdamW::Step(std::vector<at::Tensor> gradients,
   for (size_t i = 0; i < gradients.size(); ++i) {
     TrainedParameter& parameter = parameters_.all()[i];
     if (!parameter.is_trained || !gradients[i].defined()) continue;
-    if (parameter.decays) parameter.value.mul_(1.0 - learning_rate * options_.weight_decay);
+    const double rate = learning_rate * options_.rate_factors[static_cast<size_t>(parameter.group)];
+    if (parameter.decays) parameter.value.mul_(1.0 - rate * options_.weight_decay);
     at::Tensor& first = moments_.first[i];
     at::Tensor& second = moments_.second[i];
     first.mul_(options_.beta1).add_(gradients[i], 1.0 - options_.beta1);
     second.mul_(options_.beta2).addcmul_(gradients[i], gradients[i], 1.0 - options_.beta2);
     const at::Tensor root = (second / correction2).sqrt_().add_(options_.epsilon);
-    parameter.value.addcdiv_(first, root, -learning_rate / correction1);
+    parameter.value.addcdiv_(first, root, -rate / correction1);
     if (moments_.mean.empty()) continue;
     // At first of few steps, or the fresh values would last long.
     const double decay = std::min(options_.ema_decay, power / (power + 9.0));

@@ -30,6 +30,8 @@ struct AdamWOptions {
   double weight_decay = 0.05;   // of parameters that decay
   double max_group_norm = 1.0;  // longer gradients of a group are shortened to this; 0 = none
   double ema_decay = 0.0;       // of the mean of past values; 0 = none is kept
+  // Over the learning rate of a step, by group.
+  std::array<double, kNumParameterGroups> rate_factors = {1.0, 1.0, 1.0, 1.0};
 };
 
 // AdamW (Loshchilov and Hutter) with clipping by group. LibTorch's own keeps its state behind

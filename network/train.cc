@@ -159,10 +159,7 @@ class TrainRun {
                     options.lora_only ? TrainedParts::kLoraAndDistractorHead : TrainedParts::kAll,
                     options.weights_seed,
                     device_),
-        optimiser_(parameters_,
-                   {.weight_decay = options.weight_decay,
-                    .max_group_norm = options.max_gradient_norm,
-                    .ema_decay = options.ema_decay}),
+        optimiser_(parameters_, OptimiserOf(options)),
         samples_(options),
         held_out_(HeldOut(options.scenes), options.scene_kind) {
     start_.weights.reset();

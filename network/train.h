@@ -67,9 +67,10 @@ struct TrainOptions {
 
   int64_t num_steps = 1000;
   int samples_per_step = 4;
-  double learning_rate = 1e-4;  // highest
-  double warmup_share = 0.05;   // of the steps, in which the rate rises
-  double decay_share = 0.95;    // of the steps, the last, in which it falls
+  double learning_rate = 1e-4;      // highest
+  double head_learning_rate = 0.0;  // highest of the distractor head; 0 = as the rest
+  double warmup_share = 0.05;       // of the steps, in which the rates rise
+  double decay_share = 0.95;        // of the steps, the last, in which they fall
   double weight_decay = 0.05;
   double max_gradient_norm = 1.0;
   double ema_decay = 0.0;  // of the weights that are written; 0 = those of the last step
@@ -91,8 +92,8 @@ struct TrainOptions {
 
 // Of one step; means over its samples.
 struct TrainingStep {
-  int64_t step = 0;  // counted from 0
-  double learning_rate = 0.0;
+  int64_t step = 0;                                    // counted from 0
+  double learning_rate = 0.0;                          // of all but the distractor head
   double loss = 0.0;                                   // weighted sum
   std::array<double, kNumTrainingLosses> losses = {};  // not weighted
 };

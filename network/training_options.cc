@@ -67,6 +67,8 @@ void TrainOptions::Check() const {
   VGTW_CHECK(num_steps > 0, "num_steps = " + std::to_string(num_steps));
   VGTW_CHECK(samples_per_step > 0, "samples_per_step = " + std::to_string(samples_per_step));
   CheckPositive(learning_rate, "learning_rate");
+  VGTW_CHECK(head_learning_rate >= 0.0 && std::isfinite(head_learning_rate),
+             "head_learning_rate = " + std::to_string(head_learning_rate));
   CheckShare(warmup_share, "warmup_share");
   CheckShare(decay_share, "decay_share");
   VGTW_CHECK(warmup_share + decay_share <= 1.0, "warmup_share and decay_share exceed 1");
@@ -83,6 +85,17 @@ LearningRateSchedule ScheduleOf(const TrainOptions& options) {
           .warmup_share = options.warmup_share,
           .decay_share = options.decay_share,
           .num_steps = options.num_steps};
+}
+
+AdamWOptions OptimiserOf(const TrainOptions& options) {
+  AdamWOptions optimiser = {.weight_decay = options.weight_decay,
+                            .max_group_norm = options.max_gradient_norm,
+                            .ema_decay = options.ema_decay};
+  if (options.head_learning_rate > 0.0) {
+    const auto head = static_cast<size_t>(ParameterGroup::kDistractorHead);
+    optimiser.rate_factors[head] = options.head_learning_rate / options.learning_rate;
+  }
+  return optimiser;
 }
 
 std::string IdentityOf(const TrainOptions& options, uint64_t start) {
@@ -105,6 +118,7 @@ std::string IdentityOf(const TrainOptions& options, uint64_t start) {
                          {"folders", folders},
                          {"samples_per_step", options.samples_per_step},
                          {"learning_rate", options.learning_rate},
+                         {"head_learning_rate", options.head_learning_rate},
                          {"warmup_share", options.warmup_share},
                          {"decay_share", options.decay_share},
                          {"weight_decay", options.weight_decay},

@@ -11,6 +11,7 @@
 namespace vgtw {
 
 LearningRateSchedule ScheduleOf(const TrainOptions& options);
+AdamWOptions OptimiserOf(const TrainOptions& options);
 
 // What must be the same for a run to go on: everything that a step's result depends on, but not
 // how many steps there are to be. `start` is the Fingerprint of the weights that it started from.

@@ -251,8 +251,11 @@ struct TrainCommand {
         .Add("steps", &num_steps, "Steps in all; more than a finished run had go on from it")
         .Add("samples_per_step", &options.samples_per_step, "Samples whose gradients are averaged")
         .Add("learning_rate", &options.learning_rate, "The highest")
-        .Add("warmup_share", &options.warmup_share, "Share of the steps in which it rises")
-        .Add("decay_share", &options.decay_share, "Share of the steps in which it falls, the last")
+        .Add("head_learning_rate",
+             &options.head_learning_rate,
+             "The highest of the distractor head; 0 = as the rest")
+        .Add("warmup_share", &options.warmup_share, "Share of the steps in which they rise")
+        .Add("decay_share", &options.decay_share, "Share of the steps in which they fall, the last")
         .Add("weight_decay", &options.weight_decay, "Of weights of products but LoRA's")
         .Add("max_gradient_norm",
              &options.max_gradient_norm,

@@ -86,6 +86,28 @@ TEST_F(AdamWTest, TwoStepsAreThePublishedOnes) {
   EXPECT_LT(num_decaying, references.size());
 }
 
+TEST_F(AdamWTest, GroupMovesAtItsOwnRate) {
+  constexpr auto kGroup = static_cast<size_t>(ParameterGroup::kHeads);
+  AdamWOptions options{.weight_decay = 0.1, .max_group_norm = 0.0};
+  options.rate_factors[kGroup] = 3.0;
+  std::vector<ReferenceAdamW> references;
+  for (const TrainedParameter& parameter : parameters_.all()) {
+    references.emplace_back(parameter.value.flatten()[0].item<double>());
+  }
+  AdamW(parameters_, options).Step(Gradients(0.5), 0, 0.01);
+  size_t num_in_group = 0;
+  for (size_t i = 0; i < references.size(); ++i) {
+    const TrainedParameter& parameter = parameters_.all()[i];
+    const bool is_in_group = static_cast<size_t>(parameter.group) == kGroup;
+    num_in_group += is_in_group;
+    references[i].Step(0.5, 1, is_in_group ? 0.03 : 0.01, parameter.decays ? 0.1 : 0.0);
+    EXPECT_NEAR(parameter.value.flatten()[0].item<double>(), references[i].value(), 5e-7)
+        << parameter.name;
+  }
+  EXPECT_GT(num_in_group, 0u);
+  EXPECT_LT(num_in_group, references.size());
+}
+
 TEST_F(AdamWTest, NormsOfGroupsAreThoseBeforeClipping) {
   AdamW optimiser(parameters_, {.max_group_norm = 1.0});
   double num_in_trunk = 0.0;

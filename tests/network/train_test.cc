@@ -10,6 +10,7 @@
 #include "tests/network/tiny_training.h"
 #include "tests/support/temporary_folder.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <limits>
 #include <stdexcept>
@@ -64,6 +65,32 @@ TEST(Train, WritesLoraAndHeadThatLoadOverTheirBase) {
   EXPECT_EQ(config.num_camera_heads, 2);
   EXPECT_EQ(config.num_camera_blocks, 1);
   EXPECT_FALSE(config.has_point_head);
+}
+
+TEST(Train, HeadHasARateOfItsOwn) {
+  const TemporaryFolder folder;
+  TrainOptions base = ShortRun(/*lora_only=*/false);
+  base.num_steps = 1;
+  Train(base, folder / "base");
+  TrainOptions options = ShortRun(/*lora_only=*/true);
+  options.weights = {folder / "base" / "weights.safetensors"};
+  options.num_steps = 1;
+  options.warmup_share = options.decay_share = 0.0;
+  Train(options, folder / "one_rate");
+  options.head_learning_rate = 2.0 * options.learning_rate;
+  Train(options, folder / "two_rates");
+  const Checkpoint one_rate(folder / "one_rate" / "weights.safetensors");
+  const Checkpoint two_rates(folder / "two_rates" / "weights.safetensors");
+  bool moved_head = false;
+  for (const auto& [name, tensor] : one_rate.tensors()) {
+    const bool is_equal = std::ranges::equal(tensor.bytes, two_rates.tensors().at(name).bytes);
+    if (name.starts_with("mask_head.")) {
+      moved_head |= !is_equal;
+    } else {
+      EXPECT_TRUE(is_equal) << name;
+    }
+  }
+  EXPECT_TRUE(moved_head);
 }
 
 TEST(Train, LowersTheLossOfANewNetwork) {
@@ -188,6 +215,9 @@ TEST(Train, FaultyOptionsAreNamed) {
               o.learning_rate = std::numeric_limits<double>::quiet_NaN();
             }).find("learning_rate"),
             std::string::npos);
+  EXPECT_NE(
+      message([](TrainOptions& o) { o.head_learning_rate = -1.0; }).find("head_learning_rate"),
+      std::string::npos);
   EXPECT_NE(message([](TrainOptions& o) { o.loss_weights[0] = -1.0; }).find("mask_weight"),
             std::string::npos);
   EXPECT_NE(message([](TrainOptions& o) { o.warmup_share = 0.9; }).find("decay_share"),
