@@ -16,6 +16,7 @@ namespace {
 constexpr double kCoarseTolerance = 1e-4;
 constexpr double kFineTolerance = 1e-7;
 constexpr double kMaxMedians = 6.0;
+constexpr double kMinTightening = 0.1;
 // Uncertainties of more parameters take longer than the adjustment; priors keep their sigmas then.
 constexpr int kMaxParametersInRounds = 1500;
 // Keypoints are not better than that, however few there are.
@@ -89,6 +90,12 @@ void RoundLimits::Tighten(const std::map<ImageId, double>& median_px) {
     double& limit_px = max_error_px.at(id);
     limit_px = std::min(limit_px, std::max(kMaxMedians * image_median_px, final_px));
   }
+}
+
+bool RoundLimits::IsTighterThan(const RoundLimits& before) const {
+  return std::any_of(max_error_px.begin(), max_error_px.end(), [&](const auto& entry) {
+    return entry.second < (1.0 - kMinTightening) * before.max_error_px.at(entry.first);
+  });
 }
 
 bool RoundLimits::Widen() {

@@ -24,7 +24,8 @@ struct RoundLimits {
   void Tighten(const std::map<ImageId, double>& median_px);
   // Doubles them. Whether any changed.
   bool Widen();
-  bool operator==(const RoundLimits&) const = default;
+  // Whether any is lower than it was by a share that lets observations go.
+  bool IsTighterThan(const RoundLimits& before) const;
 };
 
 struct RoundOutcome {

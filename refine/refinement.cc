@@ -371,7 +371,10 @@ RefineModelResult Refinement::Run() {
     const RoundLimits before_round = limits;
     const bool has_gained = RunRound(limits);
     // The same again would come of the same limits and poses.
-    if (!has_gained && limits == before_round && !(HasFoundNothing() && limits.Widen())) break;
+    if (!has_gained && !limits.IsTighterThan(before_round) &&
+        !(HasFoundNothing() && limits.Widen())) {
+      break;
+    }
   }
   if (!IsLate()) TryFewerIntrinsics(limits);
   result.is_out_of_time = IsLate();

@@ -65,6 +65,17 @@ TEST(RoundLimits, BecomeTighter) {
   EXPECT_TRUE(RoundLimits{}.IsFinal());
 }
 
+TEST(RoundLimits, AreTighterOnlyByAShareThatMatters) {
+  RoundLimits before;
+  before.max_error_px = {{1, 60.0}, {2, 30.0}};
+  RoundLimits limits = before;
+  EXPECT_FALSE(limits.IsTighterThan(before));
+  limits.max_error_px = {{1, 80.0}, {2, 28.0}};
+  EXPECT_FALSE(limits.IsTighterThan(before));
+  limits.max_error_px = {{1, 80.0}, {2, 26.0}};
+  EXPECT_TRUE(limits.IsTighterThan(before));
+}
+
 TEST(RoundLimits, AreWidenedUpToTheWorst) {
   RoundLimits limits;
   limits.worst_px = 50.0;
